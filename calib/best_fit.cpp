@@ -1,0 +1,71 @@
+#include "calib/best_fit.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+namespace zeropose {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// A spread across the line below this share of the length along it is taken for a line.
+constexpr double collinear_ratio = 1e-6;
+
+struct Moments {
+  double weight = 0;
+  Vector3d centre_A = Vector3d::Zero(), centre_B = Vector3d::Zero();
+  Matrix3d cross = Matrix3d::Zero(), spread_A = Matrix3d::Zero(), spread_B = Matrix3d::Zero();
+};
+
+Moments moments_of(std::span<const PointPair> pairs) {
+  Moments m;
+  for (const auto& pair : pairs) {
+    m.weight += pair.weight;
+    m.centre_A += pair.weight * pair.p_A_mm;
+    m.centre_B += pair.weight * pair.p_B_mm;
+  }
+  m.centre_A /= m.weight;
+  m.centre_B /= m.weight;
+  for (const auto& pair : pairs) {
+    const Vector3d a = pair.p_A_mm - m.centre_A, b = pair.p_B_mm - m.centre_B;
+    m.cross += pair.weight * a * b.transpose();
+    m.spread_A += pair.weight * a * a.transpose();
+    m.spread_B += pair.weight * b * b.transpose();
+  }
+  return m;
+}
+
+bool is_line(const Matrix3d& spread) {
+  const Vector3d squares = Eigen::JacobiSVD<Matrix3d>(spread).singularValues();
+  return !(squares(1) > collinear_ratio * collinear_ratio * squares(0));
+}
+
+bool is_finite(const PointPair& pair) {
+  return pair.p_A_mm.allFinite() && pair.p_B_mm.allFinite() && std::isfinite(pair.weight) && pair.weight >= 0;
+}
+
+}  // namespace
+
+BestFitResult best_fit(std::span<const PointPair> pairs) {
+  if (!std::all_of(pairs.begin(), pairs.end(), is_finite)) return {BestFitStatus::not_finite, {}, {}, 0};
+  if (std::count_if(pairs.begin(), pairs.end(), [](const auto& pair) { return pair.weight > 0; }) < 3)
+    return {BestFitStatus::too_few_points, {}, {}, 0};
+  const Moments m = moments_of(pairs);
+  if (is_line(m.spread_A) || is_line(m.spread_B)) return {BestFitStatus::collinear, {}, {}, 0};
+
+  BestFitResult result;
+  result.status = BestFitStatus::ok;
+  result.X_AB.linear() = nearest_rotation(m.cross);
+  result.X_AB.translation() = m.centre_A - result.X_AB.linear() * m.centre_B;
+  double sum = 0;
+  for (const auto& pair : pairs) {
+    result.residuals_mm.push_back(pair.p_A_mm - result.X_AB * pair.p_B_mm);
+    sum += pair.weight * result.residuals_mm.back().squaredNorm();
+  }
+  result.rms_mm = std::sqrt(sum / m.weight);
+  return result;
+}
+
+}  // namespace zeropose

@@ -1,0 +1,18 @@
+# One static library per room. Its link list is the architecture: nothing else may be included.
+find_package(Threads REQUIRED)
+
+add_library(zeropose_flags INTERFACE)
+target_include_directories(zeropose_flags INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
+target_compile_options(zeropose_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Werror)
+if(ZEROPOSE_SANITIZE)
+  target_compile_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE} -fno-sanitize-recover=all
+                         -fno-omit-frame-pointer)
+  target_link_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE})
+endif()
+
+# zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME.
+function(zeropose_room name)
+  cmake_parse_arguments(ROOM "" "" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
+  add_library(zeropose_${name} STATIC ${ROOM_SOURCES})
+  target_link_libraries(zeropose_${name} PUBLIC zeropose_flags ${ROOM_LINK} PRIVATE ${ROOM_PRIVATE_LINK})
+endfunction()

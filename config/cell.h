@@ -1,0 +1,63 @@
+// The cell file: everything an engineer decides about one cell, as plain values (spec 95).
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "calib/camera_model.h"
+#include "drivers/camera.h"
+#include "measure/correction.h"
+#include "measure/job.h"
+#include "protocol/conventions.h"
+
+namespace zeropose {
+
+struct RobotOptions {
+  std::string name;
+  std::string address = "127.0.0.1";  // where the Modbus TCP server listens for this robot
+  std::uint16_t port = 1502;
+  std::uint8_t unit = 1;
+  Convention convention = Convention::generic;
+  CorrectionFrame frame = CorrectionFrame::object_zero;
+  Pose X_WR = Pose::Identity();
+  std::chrono::milliseconds validity{2000};
+  bool require_command_crc = true;
+  std::vector<std::string> allowed_writers;  // addresses; empty: any
+  std::vector<std::string>
+      allowed_readers;  // addresses that may read but never write; empty: none beside the writers
+};
+
+struct Cell {
+  std::string name;
+  bool simulated = false;
+  std::vector<CameraOptions> cameras;
+  std::vector<CalibratedCamera> calibration;  // same order as cameras
+  std::vector<Job> jobs;
+  std::vector<RobotOptions> robots;
+  std::chrono::milliseconds deadline{500};  // command to answer, including the grab
+  int zero_frames = 10;                     // averaged for a zero measurement
+  std::chrono::milliseconds zero_deadline{10000};
+  std::uint32_t config_hash = 0;       // first four bytes of SHA-256 over the cell file
+  std::uint32_t calibration_hash = 0;  // ... over the calibration file
+};
+
+// Everything that is wrong with a file, one line per mistake: file, line or key path, what was found, what is
+// expected.
+class ConfigError : public std::runtime_error {
+ public:
+  explicit ConfigError(std::vector<std::string> mistakes);
+  const std::vector<std::string>& mistakes() const { return mistakes_; }
+
+ private:
+  std::vector<std::string> mistakes_;
+};
+
+// Reads and validates the cell file and the calibration file that it names. Throws ConfigError with all
+// mistakes at once.
+Cell load_cell(const std::filesystem::path& path);
+
+}  // namespace zeropose

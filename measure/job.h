@@ -1,0 +1,68 @@
+// What is measured: marks on an object, which camera sees which, and what a result must fulfil (spec 50).
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "calib/camera_model.h"
+#include "measure/marks.h"
+
+namespace zeropose {
+
+inline constexpr double no_tolerance = std::numeric_limits<double>::infinity();
+
+// A flat round mark on the object.
+struct Mark {
+  std::string name;
+  MarkKind kind = MarkKind::dark_disc;
+  Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();    // its centre
+  Eigen::Vector3d normal_O = Eigen::Vector3d::Zero();  // of its plane, towards the camera; zero: unknown
+  double radius_mm = 0;                                // 0: unknown; then no eccentricity correction
+  double weight = 1;                   // the user's factor 0..1; 0: only its deviation is reported
+  double tolerance_px = no_tolerance;  // largest deviation
+  double tolerance_mm = no_tolerance;
+  double sigma_mm = 0;  // non-rigidity of the place it sits on
+};
+
+// Camera and mark are indices into the cell's cameras and the job's marks.
+struct View {
+  std::size_t camera = 0;
+  std::size_t mark = 0;
+};
+
+struct ApplicationPoint {
+  std::string name;
+  Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();
+};
+
+struct Range {
+  double min = 0, max = 0;
+};
+
+// What X_O0O and its estimate must fulfil (M6.2, M6.4, M6.5). Limits: x y z in mm, rx ry rz in degrees.
+struct Requirements {
+  int min_marks = 3;
+  int min_marks_per_camera = 0;  // in every camera of the job
+  int min_cameras = 1;
+  double max_sigma_mm = 0;  // at every application point, one sigma of the largest direction; 0: not checked
+  double max_compensation_mm = 5;
+  std::array<Range, 6> limits{};
+};
+
+struct Job {
+  std::string name;
+  int number = 0;  // as the robot selects it
+  std::vector<Mark> marks;
+  std::vector<View> views;
+  Pose X_WO_nominal =
+      Pose::Identity();        // where the object stops ideally, before a zero measurement says it better
+  double search_mm = 0;        // search areas reach this far round the expected place
+  double system_sigma_px = 0;  // calibration errors that remain after zero (M6.3)
+  std::vector<ApplicationPoint> application_points;
+  Requirements requirements;
+};
+
+}  // namespace zeropose

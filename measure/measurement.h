@@ -1,0 +1,40 @@
+// The whole staircase from images to a checked relative pose, pure: it replays anywhere (spec 50, 90).
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "measure/image.h"
+#include "measure/job.h"
+#include "measure/pose.h"
+#include "measure/zero.h"
+
+namespace zeropose {
+
+// The frame of one camera of the cell; identity and time were checked by who grabbed it.
+struct CameraImage {
+  std::size_t camera = 0;  // index into the cell's cameras
+  ImageView image;
+};
+
+struct Measurement {
+  Code code = Code::internal;
+  std::string reason;                     // one sentence with the numbers, empty when ok
+  std::vector<MarkFinding> findings;      // one per view of the job
+  std::vector<Observation> observations;  // the findings that were found
+  PoseResult pose;
+  Pose X_O0O = Pose::Identity();    // meaningful only when code is ok
+  double largest_deviation_mm = 0;  // of the effective marks
+  double sigma_mm = 0;              // at the worst application point
+};
+
+// Finds the marks only: the first step of measure() and all that a zero measurement needs of a frame.
+std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, const Job& job,
+                                        std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected);
+
+// Marks, pose, security and limits in the order of M6; the first check that fails names the code.
+Measurement measure(std::span<const CameraImage> images, const Job& job,
+                    std::span<const CalibratedCamera> cameras, const Zero& zero);
+
+}  // namespace zeropose

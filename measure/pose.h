@@ -1,0 +1,61 @@
+// The pose of an object from marks in any number of cameras (spec 50 M3).
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "calib/camera_model.h"
+#include "measure/code.h"
+#include "measure/job.h"
+
+namespace zeropose {
+
+// A found pixel of a mark in one frame. Indices into PoseProblem::cameras and ::marks.
+struct Observation {
+  std::size_t camera = 0;
+  std::size_t mark = 0;
+  Eigen::Vector2d u_px = Eigen::Vector2d::Zero();  // centre of the mark's image (for a disc: of the ellipse)
+  Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
+};
+
+enum class Residual { reprojection, algebraic };
+
+struct PoseProblem {
+  std::span<const CalibratedCamera> cameras;
+  std::span<const Mark> marks;
+  std::span<const Observation> observations;
+  std::optional<Pose> X_WO_start;   // none: any pose (start by depth factors)
+  std::optional<Pose> X_WP_planar;  // a sheet: only x, y, rz in this plane are free
+  double system_sigma_px = 0;
+  Residual residual = Residual::reprojection;
+  bool reject_wrong_marks = true;  // M6.3
+};
+
+// Found minus projected for one observation, in the order of the problem.
+struct Deviation {
+  Eigen::Vector2d dev_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d dev_mm = Eigen::Vector2d::Zero();  // at the mark's distance: dev_px / f * zc
+  double normalised = 0;                             // by its standard deviation (data snooping)
+  bool used = false;                                 // took part in the final estimate
+  bool removed = false;                              // thrown out as wrong
+};
+
+struct PoseResult {
+  Code code = Code::internal;
+  std::string reason;  // one sentence with the numbers, empty when ok
+  Pose X_WO = Pose::Identity();
+  Matrix6 covariance = Matrix6::Zero();  // of the delta in moved(): mm, rad, axes of W, about O's origin
+  std::vector<Deviation> deviations;
+  std::vector<std::size_t> removed;  // observations, in the order of removal
+  int effective_marks = 0;
+  int effective_cameras = 0;
+  int redundancy = 0;    // equations minus unknowns
+  double condition = 0;  // of the scaled normal matrix
+};
+
+PoseResult estimate_pose(const PoseProblem& problem);
+
+}  // namespace zeropose
