@@ -4,11 +4,12 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
-#include <stdexcept>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "calib/camera_model.h"
+#include "config/config_error.h"
 #include "drivers/camera.h"
 #include "measure/correction.h"
 #include "measure/job.h"
@@ -45,19 +46,19 @@ struct Cell {
   std::uint32_t calibration_hash = 0;  // ... over the calibration file
 };
 
-// Everything that is wrong with a file, one line per mistake: file, line or key path, what was found, what is
-// expected.
-class ConfigError : public std::runtime_error {
- public:
-  explicit ConfigError(std::vector<std::string> mistakes);
-  const std::vector<std::string>& mistakes() const { return mistakes_; }
-
- private:
-  std::vector<std::string> mistakes_;
-};
-
 // Reads and validates the cell file and the calibration file that it names. Throws ConfigError with all
 // mistakes at once.
 Cell load_cell(const std::filesystem::path& path);
+
+// The same from the bytes of both files; the names are for messages. For tools and tests that hold no files.
+struct CellText {
+  std::string cell, cell_name;
+  std::string calibration, calibration_name;
+};
+Cell parse_cell(const CellText& text);
+
+// Every key that a cell file may have, as "jobs[].marks[].name": what the loader asks for, to compare with
+// config/cell.schema.json.
+std::set<std::string> known_cell_keys();
 
 }  // namespace zeropose

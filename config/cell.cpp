@@ -1,0 +1,287 @@
+#include "config/cell.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+
+#include "config/cameras.h"
+#include "config/cell_checks.h"
+#include "config/files.h"
+#include "config/ipv4.h"
+#include "config/json_reader.h"
+#include "config/text.h"
+
+namespace zeropose {
+namespace {
+
+constexpr double largest_mm = 1e6;
+constexpr std::array<std::string_view, 1> driver_names{"gige"};
+constexpr std::array<std::string_view, 2> mark_kind_names{"dark_disc", "bright_disc"};
+constexpr std::array<std::string_view, 1> link_names{"modbus-tcp"};
+constexpr std::array<std::string_view, 4> frame_names{"object_zero", "world_shift", "robot_base_shift",
+                                                      "user_frame"};
+
+void read_address(JsonObject& object, std::string_view key, std::string& address) {
+  std::string text;
+  if (!object.read(key, text)) return;
+  if (is_ipv4(text))
+    address = text;
+  else
+    object.add_mistake(key, in_quotes(text), "an IPv4 address such as 192.168.10.11");
+}
+
+void read_addresses(JsonObject& object, std::string_view key, std::vector<std::string>& addresses) {
+  if (!object.read_optional(key, addresses)) return;
+  for (std::size_t i = 0; i < addresses.size(); ++i)
+    if (!is_ipv4(addresses[i]))
+      object.add_mistake(path_of(std::string(key), i), in_quotes(addresses[i]),
+                         "an IPv4 address such as 192.168.10.11");
+}
+
+void read_milliseconds(JsonObject& object, std::string_view key, std::chrono::milliseconds& value, int min,
+                       int max) {
+  int count = static_cast<int>(value.count());
+  if (object.read_optional(key, count, min, max)) value = std::chrono::milliseconds(count);
+}
+
+CameraOptions read_camera_options(JsonObject& object) {
+  CameraOptions camera;
+  std::size_t driver = 0;
+  object.read("name", camera.name);
+  object.read_word("driver", driver_names, driver);
+  read_address(object, "address", camera.address);
+  object.read("width_px", camera.width_px, 1, 65535);
+  object.read("height_px", camera.height_px, 1, 65535);
+  double exposure_us = 0, gain = 0;
+  if (object.read_optional("exposure_us", exposure_us, NumberRange{0, 1e7, true}))
+    camera.exposure_us = exposure_us;
+  if (object.read_optional("gain", gain, NumberRange{0, 1000})) camera.gain = gain;
+  return camera;
+}
+
+// A normal of length 1 within 1 %, then exactly 1.
+void read_normal(JsonObject& object, Eigen::Vector3d& normal_O) {
+  Eigen::Vector3d given;
+  if (!object.read_optional("normal", given, 2.0)) return;
+  if (std::abs(given.norm() - 1) > 0.01) {
+    object.add_mistake("normal", concat({"a vector of length ", std::to_string(given.norm())}),
+                       "a unit vector (length 0.99 to 1.01)");
+    return;
+  }
+  normal_O = given.normalized();
+}
+
+// The cameras of a mark by name; indices are found once the file is read.
+struct NamedMark {
+  Mark mark;
+  std::vector<std::string> cameras;
+};
+
+NamedMark read_mark(JsonObject& object) {
+  NamedMark named;
+  Mark& mark = named.mark;
+  std::size_t kind = 0;
+  object.read("name", mark.name);
+  object.read("cameras", named.cameras);
+  if (object.read_word("kind", mark_kind_names, kind)) mark.kind = static_cast<MarkKind>(kind);
+  object.read("position_mm", mark.p_O_mm, largest_mm);
+  read_normal(object, mark.normal_O);
+  object.read_optional("radius_mm", mark.radius_mm, NumberRange{0, 1000, true});
+  object.read_optional("weight", mark.weight, NumberRange{0, 1});
+  object.read_optional("tolerance_px", mark.tolerance_px, NumberRange{0, 1000, true});
+  object.read_optional("tolerance_mm", mark.tolerance_mm, NumberRange{0, 1000, true});
+  object.read_optional("sigma_mm", mark.sigma_mm, NumberRange{0, 100});
+  return named;
+}
+
+void read_requirements(JsonObject& object, Requirements& requirements) {
+  object.read("min_marks", requirements.min_marks, 3, 10000);
+  object.read_optional("min_marks_per_camera", requirements.min_marks_per_camera, 0, 10000);
+  object.read_optional("min_cameras", requirements.min_cameras, 1, 1000);
+  object.read("max_sigma_mm", requirements.max_sigma_mm, NumberRange{0, 100, true});
+  object.read_optional("max_compensation_mm", requirements.max_compensation_mm, NumberRange{0, 100});
+}
+
+void read_limits(JsonObject& object, std::array<Range, 6>& limits) {
+  constexpr std::array keys{"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"};
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    object.read_range(keys[i], limits[i].min, limits[i].max, i < 3 ? 10000 : 180);
+}
+
+ApplicationPoint read_application_point(JsonObject& object) {
+  ApplicationPoint point;
+  object.read("name", point.name);
+  object.read("position_mm", point.p_O_mm, largest_mm);
+  return point;
+}
+
+// Turns the names of a mark's cameras into views.
+void add_views(JsonObject& object, const NamedMark& named, const std::vector<CameraOptions>& cameras,
+               Job& job) {
+  if (object.has("cameras") && named.cameras.empty())
+    object.add_mistake("cameras", "no camera", "at least one name of a camera of this cell");
+  for (std::size_t i = 0; i < named.cameras.size(); ++i) {
+    const std::string& name = named.cameras[i];
+    const std::string key = path_of("cameras", i);
+    const auto camera = std::ranges::find(cameras, name, &CameraOptions::name);
+    if (camera == cameras.end())
+      object.add_mistake(key, in_quotes(name), "the name of a camera of this cell");
+    else if (std::find(named.cameras.begin(), named.cameras.begin() + static_cast<std::ptrdiff_t>(i), name) !=
+             named.cameras.begin() + static_cast<std::ptrdiff_t>(i))
+      object.add_mistake(key, in_quotes(name) + " twice", "each camera once");
+    else
+      job.views.push_back({static_cast<std::size_t>(camera - cameras.begin()), job.marks.size()});
+  }
+}
+
+Job read_job(JsonObject& object, const std::vector<CameraOptions>& cameras) {
+  Job job;
+  object.read("name", job.name);
+  object.read("number", job.number, 1, 65535);
+  object.read("nominal_pose", job.X_WO_nominal);
+  object.read("search_mm", job.search_mm, NumberRange{0, 10000, true});
+  object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
+  object.read_each("marks", 3, [&](JsonObject& member) {
+    const NamedMark named = read_mark(member);
+    add_views(member, named, cameras, job);
+    job.marks.push_back(named.mark);
+  });
+  object.read_each("application_points", 1, [&](JsonObject& member) {
+    job.application_points.push_back(read_application_point(member));
+  });
+  object.read("requirements", [&](JsonObject& member) { read_requirements(member, job.requirements); });
+  object.read("limits", [&](JsonObject& member) { read_limits(member, job.requirements.limits); });
+  return job;
+}
+
+void read_link(JsonObject& object, RobotOptions& robot) {
+  std::size_t type = 0;
+  int port = 0, unit = robot.unit;
+  object.read_word("type", link_names, type);
+  read_address(object, "address", robot.address);
+  if (object.read("port", port, 1, 65535)) robot.port = static_cast<std::uint16_t>(port);
+  if (object.read_optional("unit", unit, 0, 255)) robot.unit = static_cast<std::uint8_t>(unit);
+}
+
+// The conventions that go over the wire: all but the matrix.
+std::vector<std::string_view> wire_convention_names() {
+  std::vector<std::string_view> names;
+  for (const Convention convention : all_conventions())
+    if (convention != Convention::matrix) names.push_back(name_of(convention));
+  return names;
+}
+
+RobotOptions read_robot(JsonObject& object) {
+  RobotOptions robot;
+  // Not the defaults: check_cell leaves out what could not be read.
+  robot.address.clear();
+  robot.port = 0;
+  object.read("name", robot.name);
+  object.read("link", [&](JsonObject& link) { read_link(link, robot); });
+  const std::vector<std::string_view> conventions = wire_convention_names();
+  std::size_t index = 0;
+  if (object.read_word("convention", conventions, index))
+    robot.convention = convention_named(conventions[index]).value_or(Convention::generic);
+  if (object.read_word("frame", frame_names, index)) robot.frame = static_cast<CorrectionFrame>(index + 1);
+  object.read("pose_in_world", robot.X_WR);
+  read_milliseconds(object, "validity_ms", robot.validity, 50, 65535);
+  object.read_optional("require_command_crc", robot.require_command_crc);
+  read_addresses(object, "allowed_writers", robot.allowed_writers);
+  read_addresses(object, "allowed_readers", robot.allowed_readers);
+  return robot;
+}
+
+void read_timing(JsonObject& object, Cell& cell) {
+  read_milliseconds(object, "deadline_ms", cell.deadline, 50, 60000);
+  object.read_optional("zero_frames", cell.zero_frames, 1, 1000);
+  read_milliseconds(object, "zero_deadline_ms", cell.zero_deadline, 50, 600000);
+}
+
+// Returns the value of "calibration".
+std::string read_cell(JsonObject& object, Cell& cell) {
+  std::string calibration, ignored;
+  object.read_optional("$schema", ignored);
+  object.read("name", cell.name);
+  object.read_optional("simulated", cell.simulated);
+  object.read("calibration", calibration);
+  object.read_each("cameras", 1,
+                   [&](JsonObject& member) { cell.cameras.push_back(read_camera_options(member)); });
+  object.read_each("jobs", 1,
+                   [&](JsonObject& member) { cell.jobs.push_back(read_job(member, cell.cameras)); });
+  object.read_each("robots", 0, [&](JsonObject& member) { cell.robots.push_back(read_robot(member)); });
+  object.read_optional("timing", [&](JsonObject& member) { read_timing(member, cell); });
+  return calibration;
+}
+
+void append(std::vector<std::string>& mistakes, const std::vector<std::string>& more) {
+  mistakes.insert(mistakes.end(), more.begin(), more.end());
+}
+
+// The cell without its calibration; mistakes go to the list.
+Cell read_cell_file(const std::string& text, const std::string& name, std::string& calibration,
+                    std::vector<std::string>& mistakes) {
+  Cell cell;
+  try {
+    const JsonValue tree = parse_json(text, name);
+    JsonReading reading(name);
+    read_object(tree, "", reading, [&](JsonObject& object) { calibration = read_cell(object, cell); });
+    check_cell(cell, reading);
+    append(mistakes, reading.mistakes());
+  } catch (const ConfigError& error) {
+    append(mistakes, error.mistakes());
+  }
+  cell.config_hash = short_hash(text);
+  return cell;
+}
+
+// Orders the calibrated cameras like the cell's and checks that they fit.
+void add_calibration(Cell& cell, const std::string& text, const std::string& name,
+                     std::vector<std::string>& mistakes) {
+  try {
+    const std::vector<CalibratedCamera> calibrated = parse_cameras(text, name);
+    JsonReading reading(name);
+    cell.calibration = calibration_in_order(cell.cameras, calibrated, reading);
+    append(mistakes, reading.mistakes());
+  } catch (const ConfigError& error) {
+    append(mistakes, error.mistakes());
+  }
+  cell.calibration_hash = short_hash(text);
+}
+
+}  // namespace
+
+Cell parse_cell(const CellText& text) {
+  std::vector<std::string> mistakes;
+  std::string calibration;
+  Cell cell = read_cell_file(text.cell, text.cell_name, calibration, mistakes);
+  add_calibration(cell, text.calibration, text.calibration_name, mistakes);
+  if (!mistakes.empty()) throw ConfigError(std::move(mistakes));
+  return cell;
+}
+
+Cell load_cell(const std::filesystem::path& path) {
+  std::vector<std::string> mistakes;
+  std::string calibration;
+  Cell cell = read_cell_file(read_file(path), path.string(), calibration, mistakes);
+  if (!calibration.empty()) {
+    try {
+      const std::filesystem::path file = path.parent_path() / calibration;
+      add_calibration(cell, read_file(file), file.string(), mistakes);
+    } catch (const ConfigError& error) {
+      append(mistakes, error.mistakes());
+    }
+  }
+  if (!mistakes.empty()) throw ConfigError(std::move(mistakes));
+  return cell;
+}
+
+std::set<std::string> known_cell_keys() {
+  JsonReading reading = JsonReading::of_the_format();
+  const JsonValue nothing;
+  Cell cell;
+  read_object(nothing, "", reading, [&](JsonObject& object) { read_cell(object, cell); });
+  return reading.known_keys();
+}
+
+}  // namespace zeropose

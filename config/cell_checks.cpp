@@ -1,0 +1,158 @@
+#include "config/cell_checks.h"
+#include "config/text.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+namespace zeropose {
+namespace {
+
+// Every element whose key (an empty one is left out) an earlier element has too.
+template <typename Elements, typename KeyOf>
+void check_unique(const Elements& elements, const std::string& path, const std::string& member, KeyOf key_of,
+                  JsonReading& reading) {
+  std::map<std::string, std::size_t> first;
+  for (std::size_t i = 0; i < elements.size(); ++i) {
+    const std::string key = key_of(elements[i]);
+    if (key.empty()) continue;
+    const auto [earlier, is_new] = first.try_emplace(key, i);
+    if (!is_new)
+      reading.add_mistake(path_of(path, i) + "." + member, key + ", as in " + path_of(path, earlier->second),
+                          "another one for each");
+  }
+}
+
+const auto name_in_quotes = [](const auto& element) {
+  return element.name.empty() ? std::string() : in_quotes(element.name);
+};
+
+void check_cameras(const Cell& cell, JsonReading& reading) {
+  check_unique(cell.cameras, "cameras", "name", name_in_quotes, reading);
+  check_unique(
+      cell.cameras, "cameras", "address", [](const CameraOptions& camera) { return camera.address; },
+      reading);
+}
+
+// How many marks of a weight above 0 each camera of the job sees.
+std::map<std::size_t, int> marks_per_camera(const Job& job) {
+  std::map<std::size_t, int> count;
+  for (const View& view : job.views) count[view.camera] += job.marks[view.mark].weight > 0 ? 1 : 0;
+  return count;
+}
+
+void check_requirements(const Job& job, const std::string& path, const std::vector<CameraOptions>& cameras,
+                        JsonReading& reading) {
+  const Requirements& needed = job.requirements;
+  const auto marks = std::ranges::count_if(job.marks, [](const Mark& mark) { return mark.weight > 0; });
+  if (job.marks.size() >= 3 && needed.min_marks > marks)
+    reading.add_mistake(path + ".requirements.min_marks", std::to_string(needed.min_marks),
+                        concat({"at most the ", std::to_string(marks), " marks with a weight above 0"}));
+  const std::map<std::size_t, int> per_camera = marks_per_camera(job);
+  if (per_camera.empty()) return;
+  const auto useful = std::ranges::count_if(per_camera, [](const auto& camera) { return camera.second > 0; });
+  if (needed.min_cameras > useful)
+    reading.add_mistake(
+        path + ".requirements.min_cameras", std::to_string(needed.min_cameras),
+        concat({"at most the ", std::to_string(useful), " cameras that see marks with a weight above 0"}));
+  for (const auto& [camera, count] : per_camera)
+    if (needed.min_marks_per_camera > count)
+      reading.add_mistake(path + ".requirements.min_marks_per_camera",
+                          std::to_string(needed.min_marks_per_camera),
+                          concat({"at most the ", std::to_string(count), " marks with a weight above 0 of ",
+                                  in_quotes(cameras[camera].name)}));
+}
+
+void check_jobs(const Cell& cell, JsonReading& reading) {
+  check_unique(cell.jobs, "jobs", "name", name_in_quotes, reading);
+  check_unique(
+      cell.jobs, "jobs", "number",
+      [](const Job& job) { return job.number == 0 ? std::string() : std::to_string(job.number); }, reading);
+  for (std::size_t i = 0; i < cell.jobs.size(); ++i) {
+    const std::string path = path_of("jobs", i);
+    check_unique(cell.jobs[i].marks, path + ".marks", "name", name_in_quotes, reading);
+    check_unique(cell.jobs[i].application_points, path + ".application_points", "name", name_in_quotes,
+                 reading);
+    check_requirements(cell.jobs[i], path, cell.cameras, reading);
+  }
+}
+
+// Two servers cannot listen on one port; 0.0.0.0 takes the port of every address.
+void check_ports(const std::vector<RobotOptions>& robots, JsonReading& reading) {
+  const std::string every = "0.0.0.0";
+  for (std::size_t i = 0; i < robots.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      if (robots[i].port == 0 || robots[i].address.empty() || robots[j].address.empty()) continue;
+      const bool overlap =
+          robots[i].address == robots[j].address || robots[i].address == every || robots[j].address == every;
+      if (!overlap || robots[i].port != robots[j].port) continue;
+      reading.add_mistake(path_of("robots", i) + ".link.port",
+                          robots[i].address + ":" + std::to_string(robots[i].port) + ", as in " +
+                              path_of("robots", j) + ".link",
+                          "a port of its own for each robot");
+      break;
+    }
+}
+
+void check_robots(const Cell& cell, JsonReading& reading) {
+  check_unique(cell.robots, "robots", "name", name_in_quotes, reading);
+  check_ports(cell.robots, reading);
+  for (std::size_t i = 0; i < cell.robots.size(); ++i) {
+    const RobotOptions& robot = cell.robots[i];
+    const std::string path = path_of("robots", i);
+    const std::set<std::string> writers(robot.allowed_writers.begin(), robot.allowed_writers.end());
+    for (std::size_t j = 0; j < robot.allowed_readers.size(); ++j)
+      if (writers.contains(robot.allowed_readers[j]))
+        reading.add_mistake(path_of(path + ".allowed_readers", j),
+                            in_quotes(robot.allowed_readers[j]) + ", as in allowed_writers",
+                            "each address in one of the two lists");
+  }
+}
+
+bool reaches_corners(const CameraModel& model) {
+  for (const double u : {-0.5, model.width_px - 0.5})
+    for (const double v : {-0.5, model.height_px - 0.5})
+      if (!ray(model, {u, v})) return false;
+  return true;
+}
+
+std::string size_text(int width_px, int height_px) {
+  return std::to_string(width_px) + " x " + std::to_string(height_px) + " px";
+}
+
+}  // namespace
+
+void check_cell(const Cell& cell, JsonReading& reading) {
+  check_cameras(cell, reading);
+  check_jobs(cell, reading);
+  check_robots(cell, reading);
+  if (cell.zero_deadline < cell.deadline)
+    reading.add_mistake("timing.zero_deadline_ms", std::to_string(cell.zero_deadline.count()),
+                        concat({"at least deadline_ms, ", std::to_string(cell.deadline.count())}));
+}
+
+std::vector<CalibratedCamera> calibration_in_order(std::span<const CameraOptions> cameras,
+                                                   std::span<const CalibratedCamera> calibrated,
+                                                   JsonReading& reading) {
+  std::vector<CalibratedCamera> ordered;
+  for (const CameraOptions& camera : cameras) {
+    if (camera.name.empty()) continue;
+    const auto found = std::ranges::find(calibrated, camera.name, &CalibratedCamera::name);
+    if (found == calibrated.end()) {
+      reading.add_mistake(camera.name, "no such key", "the calibration of this camera of the cell");
+      continue;
+    }
+    const CameraModel& model = found->model;
+    const bool size_known = camera.width_px > 0 && camera.height_px > 0;
+    if (size_known && (model.width_px != camera.width_px || model.height_px != camera.height_px))
+      reading.add_mistake(camera.name, size_text(model.width_px, model.height_px),
+                          concat({"the camera's ", size_text(camera.width_px, camera.height_px)}));
+    if (!reaches_corners(model))
+      reading.add_mistake(camera.name, "a lens model that gives no direction for a corner of the image",
+                          "one that holds for the whole image");
+    ordered.push_back(*found);
+  }
+  return ordered;
+}
+
+}  // namespace zeropose

@@ -1,0 +1,22 @@
+// What must fit together inside a cell file, beyond the single keys.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "config/cell.h"
+#include "config/json_reader.h"
+
+namespace zeropose {
+
+// Names, numbers and addresses used twice, requirements that the marks cannot fulfil, deadlines. Values that
+// could not be read are left out.
+void check_cell(const Cell& cell, JsonReading& reading);
+
+// The calibration of each camera of the cell, in the cell's order. Mistakes: a camera without calibration, of
+// another image size, with a lens model that does not reach its corners.
+std::vector<CalibratedCamera> calibration_in_order(std::span<const CameraOptions> cameras,
+                                                   std::span<const CalibratedCamera> calibrated,
+                                                   JsonReading& reading);
+
+}  // namespace zeropose
