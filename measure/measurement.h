@@ -29,6 +29,13 @@ struct Measurement {
   double sigma_mm = 0;              // at the worst application point
 };
 
+// Where find_job_marks() looks: one search per view of the job (the snapshot draws them).
+std::vector<MarkSearch> job_searches(const Job& job, std::span<const CalibratedCamera> cameras,
+                                     const Pose& X_WO_expected);
+
+// The findings that were found as observations, in the order of the views. `findings`: one per view of the job.
+std::vector<Observation> observations_of(std::span<const MarkFinding> findings, const Job& job);
+
 // Finds the marks only: the first step of measure() and all that a zero measurement needs of a frame.
 std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, const Job& job,
                                         std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected);
