@@ -37,13 +37,14 @@ std::string read_file(const std::filesystem::path& path) {
   errno = 0;
   std::ifstream stream(path, std::ios::binary);
   if (!stream) refuse(path, std::generic_category().message(errno));
-  // One byte more than allowed, so that a file that grows meanwhile is refused as well.
-  std::string bytes(max_file_bytes + 1, '\0');
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  std::string bytes;
+  std::vector<char> chunk(std::size_t{64} * 1024);
+  while (stream) {
+    stream.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+    bytes.append(chunk.data(), static_cast<std::size_t>(stream.gcount()));
+    if (bytes.size() > max_file_bytes) refuse(path, "more than 16 MB");
+  }
   if (stream.bad()) refuse(path, "a read error");
-  bytes.resize(static_cast<std::size_t>(stream.gcount()));
-  if (bytes.size() > max_file_bytes) refuse(path, "more than 16 MB");
-  bytes.shrink_to_fit();
   return bytes;
 }
 

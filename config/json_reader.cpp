@@ -1,6 +1,7 @@
 #include "config/json_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iomanip>
 #include <sstream>
@@ -178,47 +179,72 @@ bool JsonObject::read(std::string_view key, int& value, int min, int max) {
   return true;
 }
 
-bool JsonObject::numbers(std::string_view key, std::size_t count, double largest, const std::string& expected,
-                         double* to) {
-  const JsonValue* found = demand(key, expected);
-  if (found == nullptr) return false;
-  const auto* array = std::get_if<JsonValue::Array>(&found->value);
-  if (array == nullptr || array->size() != count) return refuse(key, *found, expected);
+bool JsonObject::numbers(const JsonValue& found, const std::string& path, std::span<double> values,
+                         std::span<const double> largest, const std::string& expected) {
+  const auto* array = std::get_if<JsonValue::Array>(&found.value);
+  if (array == nullptr || array->size() != values.size()) {
+    reading_.add_mistake(path, short_text(found), expected);
+    return false;
+  }
   bool good = true;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
     const std::optional<double> number = number_of((*array)[i]);
-    const double bound = i < 3 || count != 6 ? largest : largest_deg;
+    const double bound = largest[std::min(i, largest.size() - 1)];
     if (number && std::abs(*number) <= bound) {
-      to[i] = *number;
+      values[i] = *number;
       continue;
     }
     good = false;
-    reading_.add_mistake(path_of(path(key), i), short_text((*array)[i]),
+    reading_.add_mistake(path_of(path, i), short_text((*array)[i]),
                          text_of(NumberRange{-bound, bound, false}));
   }
   return good;
 }
 
+bool JsonObject::read(std::string_view key, std::span<double> values, double largest) {
+  const std::string expected = concat({"an array of ", std::to_string(values.size()), " numbers"});
+  const JsonValue* found = demand(key, expected);
+  return found != nullptr && numbers(*found, path(key), values, {&largest, 1}, expected);
+}
+
+bool JsonObject::read(std::string_view key, std::vector<Eigen::Vector3d>& values, double largest) {
+  const JsonValue* found = demand(key, "an array of [x, y, z]");
+  if (found == nullptr) return false;
+  const auto* array = std::get_if<JsonValue::Array>(&found->value);
+  if (array == nullptr) return refuse(key, *found, "an array of [x, y, z]");
+  std::vector<Eigen::Vector3d> vectors(array->size(), Eigen::Vector3d::Zero());
+  bool good = true;
+  for (std::size_t i = 0; i < vectors.size(); ++i)
+    good &= numbers((*array)[i], path_of(path(key), i), {vectors[i].data(), 3}, {&largest, 1},
+                    "an array of 3 numbers");
+  if (good) values = std::move(vectors);
+  return good;
+}
+
 bool JsonObject::read(std::string_view key, Eigen::Vector3d& value, double largest) {
-  Eigen::Vector3d read_value;
-  if (!numbers(key, 3, largest, "an array of 3 numbers", read_value.data())) return false;
+  Eigen::Vector3d read_value = Eigen::Vector3d::Zero();
+  if (!read(key, std::span<double>(read_value.data(), 3), largest)) return false;
   value = read_value;
   return true;
 }
 
 bool JsonObject::read(std::string_view key, Pose& X_AB) {
+  constexpr std::array bounds{largest_mm, largest_mm, largest_mm, largest_deg, largest_deg, largest_deg};
+  const std::string expected = "a pose [x, y, z, rx, ry, rz] in mm and degrees";
+  const JsonValue* found = demand(key, expected);
   std::array<double, 6> n{};
-  if (!numbers(key, 6, largest_mm, "a pose [x, y, z, rx, ry, rz] in mm and degrees", n.data())) return false;
+  if (found == nullptr || !numbers(*found, path(key), n, bounds, expected)) return false;
   X_AB = from_six_numbers({n[0], n[1], n[2], n[3], n[4], n[5]});
   return true;
 }
 
 bool JsonObject::read_range(std::string_view key, double& min, double& max, double largest) {
+  const std::string expected = "an array [min, max] with min < max";
+  const JsonValue* found = demand(key, expected);
   std::array<double, 2> bounds{};
-  if (!numbers(key, 2, largest, "an array [min, max] with min < max", bounds.data())) return false;
+  if (found == nullptr || !numbers(*found, path(key), bounds, {&largest, 1}, expected)) return false;
   if (bounds[0] >= bounds[1]) {
-    add_mistake(key, concat({"[", text_of(bounds[0]), ", ", text_of(bounds[1]), "]"}),
-                "an array [min, max] with min < max");
+    add_mistake(key, concat({"[", text_of(bounds[0]), ", ", text_of(bounds[1]), "]"}), expected);
     return false;
   }
   min = bounds[0];

@@ -71,6 +71,10 @@ class JsonObject {
   bool read(std::string_view key, int& value, int min, int max);
   bool read(std::string_view key, Eigen::Vector3d& value,
             double largest);  // [x, y, z], |component| <= largest
+  // As many numbers as `values` has, each |number| <= largest.
+  bool read(std::string_view key, std::span<double> values, double largest);
+  // An array of [x, y, z], any number of them.
+  bool read(std::string_view key, std::vector<Eigen::Vector3d>& values, double largest);
   // [x, y, z, rx, ry, rz] in mm and degrees (spec 10); lengths to 1e6 mm, angles to 360 deg.
   bool read(std::string_view key, Pose& X_AB);
   bool read(std::string_view key, std::vector<std::string>& values);
@@ -99,6 +103,9 @@ class JsonObject {
   std::string path(std::string_view key) const;
   void add_mistake(std::string_view key, const std::string& found, const std::string& expected);
 
+  // Takes note of a key that is read elsewhere.
+  void skip(std::string_view key) { note(key); }
+
   // Reports every key that nobody asked for.
   void finish();
 
@@ -106,8 +113,8 @@ class JsonObject {
   const JsonValue* demand(std::string_view key, std::string_view expected);
   void note(std::string_view key);
   bool refuse(std::string_view key, const JsonValue& value, const std::string& expected);
-  bool numbers(std::string_view key, std::size_t count, double largest, const std::string& expected,
-               double* to);
+  bool numbers(const JsonValue& found, const std::string& path, std::span<double> values,
+               std::span<const double> largest, const std::string& expected);
 
   const JsonValue& value_;
   std::string path_;
