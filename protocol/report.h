@@ -34,6 +34,8 @@ struct Request {
   std::int32_t argument = 0;
   TimePoint received;
   TimePoint deadline;  // the answer is published then at the latest, whatever it is
+  // Counts the requests of one link: a robot may use an id again, a ticket never comes back.
+  std::uint64_t ticket = 0;
 };
 
 // The cycle's answer to one request. Only code ok publishes values.
@@ -44,6 +46,7 @@ struct Report {
   int effective_marks = 0, effective_cameras = 0;
   double largest_deviation_mm = 0;
   double sigma_mm = 0;
+  std::uint64_t ticket = 0;  // of the request; 0: not told, then the id alone decides
 };
 
 // What decides whether a robot may measure, kept current by the daemon.
