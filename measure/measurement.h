@@ -29,18 +29,22 @@ struct Measurement {
   double sigma_mm = 0;              // at the worst application point
 };
 
-// Where find_job_marks() looks: one search per view of the job (the snapshot draws them).
+// Where find_job_marks() looks: one search per view of the job (the snapshot draws them). The window reaches
+// search_mm beyond the disc at its distance; a mark that has no image there has a window of size zero.
 std::vector<MarkSearch> job_searches(const Job& job, std::span<const CalibratedCamera> cameras,
                                      const Pose& X_WO_expected);
 
-// The findings that were found as observations, in the order of the views. `findings`: one per view of the job.
+// The findings that were found as observations, in the order of the views. `findings`: one per view of the
+// job.
 std::vector<Observation> observations_of(std::span<const MarkFinding> findings, const Job& job);
 
 // Finds the marks only: the first step of measure() and all that a zero measurement needs of a frame.
 std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, const Job& job,
                                         std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected);
 
-// Marks, pose, security and limits in the order of M6; the first check that fails names the code.
+// Marks, pose, security and limits in the order of M6; the first check that fails names the code. Marks are
+// searched around the zero pose and used where the zero measurement's compensation puts them. A zero without
+// compensations (default-made) is missing.
 Measurement measure(std::span<const CameraImage> images, const Job& job,
                     std::span<const CalibratedCamera> cameras, const Zero& zero);
 

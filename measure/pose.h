@@ -47,15 +47,32 @@ struct PoseResult {
   Code code = Code::internal;
   std::string reason;  // one sentence with the numbers, empty when ok
   Pose X_WO = Pose::Identity();
-  Matrix6 covariance = Matrix6::Zero();  // of the delta in moved(): mm, rad, axes of W, about O's origin
+  Matrix6 covariance = Matrix6::Zero();  // of the delta in moved(): mm, rad, axes of W, about O's origin;
+                                         // from the observations' covariance and the users' weights
+  Matrix6 total_covariance = Matrix6::Zero();  // the same with system_sigma_px and the marks' sigma_mm: what
+                                               // the result deserves
   std::vector<Deviation> deviations;
   std::vector<std::size_t> removed;  // observations, in the order of removal
   int effective_marks = 0;
   int effective_cameras = 0;
   int redundancy = 0;    // equations minus unknowns
-  double condition = 0;  // of the scaled normal matrix
+  double condition = 0;  // of the normal matrix scaled by the marks' extent, 1-norm
 };
 
+// Gauss-Newton with Levenberg's damping on the whitened residuals, weights as the user's: with W the weights
+// and J the whitened Jacobian, N = J' W^2 J and covariance = N^-1 (J' W^4 J) N^-1. Repeatable bit by bit.
+//
+// Codes: marks_invalid (an index out of range, a number that is none, a covariance that is not positive),
+// too_few_marks (fewer than 3 with weight, 2 if planar), geometry_degenerate (the marks leave a direction
+// open, or several poses explain them equally well), not_converged, deviation_not_attributable. Deviations
+// are filled in where there is an estimate, whatever the code; X_WO and the covariances count only when the
+// code is ok.
+//
+// Wrong marks: an observation is wrong when its deviation is above the mark's tolerance, or above its own
+// standard deviation by more than chance allows (0.1 % per estimate). The smallest set of observations
+// without which all others agree is removed, if no other set of that size does nearly as well (likelihood
+// ratio below 1000) and if the rest still checks itself and is more than what was removed. Otherwise nobody
+// knows which one is wrong: deviation_not_attributable.
 PoseResult estimate_pose(const PoseProblem& problem);
 
 }  // namespace zeropose

@@ -26,7 +26,14 @@ struct ZeroResult {
   PoseResult pose;      // of the averaged observations, before compensation
 };
 
-// From the observations of n frames of the object at its ideal stop. Every frame must hold the same views.
+// From the observations of n frames of the object at its ideal stop. The found pixels are averaged over the
+// frames, X_WO0 is estimated from them with nothing removed (before compensation a good mark may be off by
+// several px), held, and the marks are compensated.
+//
+// Codes: too_few_marks (a view of the job is missing in half of the frames or more; named),
+// deviation_not_attributable (a mark wandered between the frames: the object moved, or something else was
+// taken for it), compensation_too_large, and those of estimate_pose() and compensate(). zero counts only when
+// the code is ok.
 ZeroResult make_zero(std::span<const CalibratedCamera> cameras, const Job& job,
                      std::span<const std::vector<Observation>> frames);
 

@@ -1,0 +1,203 @@
+#include "measure/measurement.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "measure/security.h"
+#include "measure/words.h"
+
+namespace zeropose {
+namespace {
+
+// A mark's image is this much smaller or larger than expected at most: depth, tilt and the drawing's radius.
+constexpr double diameter_tolerance = 0.3;
+// A disc is seen this much flatter than its normal says at most.
+constexpr double axis_ratio_tolerance = 0.6;
+constexpr double usual_min_axis_ratio = 0.3;
+// Limits for marks of unknown radius.
+constexpr double smallest_diameter_px = 4;
+
+MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double search_mm, const Pose& X_WO) {
+  MarkSearch search;
+  search.kind = mark.kind;
+  const Pose X_CO = camera.X_WC.inverse() * X_WO;
+  const Eigen::Vector3d p_CQ = X_CO * mark.p_O_mm;
+  const auto u_px = project(camera.model, p_CQ);
+  if (!u_px || !in_image(camera.model, *u_px)) return search;
+  const Eigen::Vector2d px_per_mm(camera.model.fx_px / p_CQ.z(), camera.model.fy_px / p_CQ.z());
+  search.expected_px = *u_px;
+  search.half_window_px = (mark.radius_mm + search_mm) * px_per_mm;
+  const double diameter_px = 2 * mark.radius_mm * px_per_mm.maxCoeff();
+  const bool known = mark.radius_mm > 0;
+  search.min_diameter_px = known ? (1 - diameter_tolerance) * diameter_px : smallest_diameter_px;
+  search.max_diameter_px =
+      known ? (1 + diameter_tolerance) * diameter_px : 2 * search.half_window_px.minCoeff();
+  if (mark.normal_O.isZero()) return search;
+  const double facing = std::abs((X_CO.linear() * mark.normal_O).normalized().dot(p_CQ.normalized()));
+  search.min_axis_ratio = std::min(usual_min_axis_ratio, axis_ratio_tolerance * facing);
+  return search;
+}
+
+const ImageView* image_of(std::span<const CameraImage> images, std::size_t camera) {
+  for (const CameraImage& image : images)
+    if (image.camera == camera) return &image.image;
+  return nullptr;
+}
+
+Job compensated(Job job, const Zero& zero) {
+  for (std::size_t i = 0; i < job.marks.size(); ++i) job.marks[i].p_O_mm += zero.compensation_O_mm[i];
+  return job;
+}
+
+Verdict check_zero(const Job& job, const Zero& zero) {
+  if (zero.compensation_O_mm.empty())
+    return {Code::zero_missing, "no zero measurement was made for job " + job.name};
+  if (zero.compensation_O_mm.size() != job.marks.size())
+    return {Code::zero_outdated, "the zero measurement knows " + number(zero.compensation_O_mm.size()) +
+                                     " marks, job " + job.name + " has " + number(job.marks.size())};
+  const bool finite = zero.X_WO0.matrix().allFinite() &&
+                      std::all_of(zero.compensation_O_mm.begin(), zero.compensation_O_mm.end(),
+                                  [](const auto& shift) { return shift.allFinite(); });
+  if (!finite)
+    return {Code::zero_outdated, "the zero measurement of job " + job.name + " holds numbers that are none"};
+  return {Code::ok, {}};
+}
+
+Verdict check_images(std::span<const CameraImage> images, const Job& job,
+                     std::span<const CalibratedCamera> cameras) {
+  std::vector<bool> checked(cameras.size());
+  for (const View& view : job.views) {
+    if (view.camera >= cameras.size() || view.mark >= job.marks.size())
+      return {Code::marks_invalid, "job " + job.name + " names a camera or a mark that does not exist"};
+    if (checked[view.camera]) continue;
+    checked[view.camera] = true;
+    const CalibratedCamera& camera = cameras[view.camera];
+    const ImageView* image = image_of(images, view.camera);
+    if (image == nullptr || image->data == nullptr)
+      return {Code::camera_missing, "there is no picture of " + camera.name};
+    if (image->width_px != camera.model.width_px || image->height_px != camera.model.height_px)
+      return {Code::frame_wrong_size, camera.name + " delivered " + number(image->width_px) + " x " +
+                                          number(image->height_px) + " px, it is calibrated for " +
+                                          number(camera.model.width_px) + " x " +
+                                          number(camera.model.height_px)};
+    if (Verdict verdict = check_image(*image, camera.name); verdict.code != Code::ok) return verdict;
+  }
+  return {Code::ok, {}};
+}
+
+// The views that were found, and why the others were not, in the words of the finder.
+std::vector<View> found_views(const Job& job, std::span<const MarkFinding> findings, std::string& misses) {
+  std::vector<View> found;
+  for (std::size_t i = 0; i < job.views.size(); ++i) {
+    if (findings[i].status == MarkStatus::found) {
+      found.push_back(job.views[i]);
+      continue;
+    }
+    misses += (misses.empty() ? "" : ", ") + job.marks[job.views[i].mark].name + " " +
+              std::string(name_of(findings[i].status));
+  }
+  return found;
+}
+
+std::vector<View> effective_views(const Measurement& measurement) {
+  std::vector<View> used;
+  for (std::size_t i = 0; i < measurement.observations.size(); ++i)
+    if (measurement.pose.deviations[i].used)
+      used.push_back({measurement.observations[i].camera, measurement.observations[i].mark});
+  return used;
+}
+
+// Takes a verdict over; true when it is ok.
+bool passes(Measurement& measurement, Verdict verdict) {
+  measurement.code = verdict.code;
+  measurement.reason = std::move(verdict.reason);
+  return measurement.code == Code::ok;
+}
+
+bool find_all(Measurement& measurement, std::span<const CameraImage> images, const Job& job,
+              std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected) {
+  measurement.findings = find_job_marks(images, job, cameras, X_WO_expected);
+  measurement.observations = observations_of(measurement.findings, job);
+  std::string misses;
+  Verdict verdict = check_marks(job, cameras, found_views(job, measurement.findings, misses));
+  if (verdict.code != Code::ok && !misses.empty()) verdict.reason += " (" + misses + ")";
+  return passes(measurement, std::move(verdict));
+}
+
+bool estimate_all(Measurement& measurement, const Job& job, std::span<const CalibratedCamera> cameras,
+                  const Pose& X_WO_start) {
+  PoseProblem problem;
+  problem.cameras = cameras;
+  problem.marks = job.marks;
+  problem.observations = measurement.observations;
+  problem.X_WO_start = X_WO_start;
+  problem.system_sigma_px = job.system_sigma_px;
+  measurement.pose = estimate_pose(problem);
+  for (const Deviation& deviation : measurement.pose.deviations)
+    if (deviation.used)
+      measurement.largest_deviation_mm = std::max(measurement.largest_deviation_mm, deviation.dev_mm.norm());
+  return passes(measurement, {measurement.pose.code, measurement.pose.reason}) &&
+         passes(measurement, check_marks(job, cameras, effective_views(measurement)));
+}
+
+}  // namespace
+
+std::vector<MarkSearch> job_searches(const Job& job, std::span<const CalibratedCamera> cameras,
+                                     const Pose& X_WO_expected) {
+  std::vector<MarkSearch> searches;
+  for (const View& view : job.views) {
+    const bool known = view.camera < cameras.size() && view.mark < job.marks.size();
+    searches.push_back(
+        known ? search_for(cameras[view.camera], job.marks[view.mark], job.search_mm, X_WO_expected)
+              : MarkSearch{});
+  }
+  return searches;
+}
+
+std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, const Job& job,
+                                        std::span<const CalibratedCamera> cameras,
+                                        const Pose& X_WO_expected) {
+  const std::vector<MarkSearch> all = job_searches(job, cameras, X_WO_expected);
+  std::vector<MarkFinding> findings(job.views.size());
+  for (const CameraImage& image : images) {
+    std::vector<MarkSearch> searches;
+    std::vector<std::size_t> views;
+    for (std::size_t i = 0; i < job.views.size(); ++i) {
+      if (job.views[i].camera != image.camera) continue;
+      findings[i].status = MarkStatus::outside_image;
+      if (!(all[i].half_window_px.minCoeff() > 0)) continue;
+      searches.push_back(all[i]);
+      views.push_back(i);
+    }
+    const auto found = find_marks(image.image, searches);
+    for (std::size_t k = 0; k < views.size(); ++k) findings[views[k]] = found[k];
+  }
+  return findings;
+}
+
+std::vector<Observation> observations_of(std::span<const MarkFinding> findings, const Job& job) {
+  std::vector<Observation> observations;
+  for (std::size_t i = 0; i < findings.size() && i < job.views.size(); ++i)
+    if (findings[i].status == MarkStatus::found)
+      observations.push_back(
+          {job.views[i].camera, job.views[i].mark, findings[i].u_px, findings[i].covariance_px2});
+  return observations;
+}
+
+Measurement measure(std::span<const CameraImage> images, const Job& job,
+                    std::span<const CalibratedCamera> cameras, const Zero& zero) {
+  Measurement measurement;
+  if (!passes(measurement, check_zero(job, zero))) return measurement;
+  if (!passes(measurement, check_images(images, job, cameras))) return measurement;
+  const Job now = compensated(job, zero);
+  if (!find_all(measurement, images, now, cameras, zero.X_WO0)) return measurement;
+  if (!estimate_all(measurement, now, cameras, zero.X_WO0)) return measurement;
+  measurement.sigma_mm = worst_sigma_mm(now, measurement.pose);
+  if (!passes(measurement, check_sigma(now, measurement.pose))) return measurement;
+  measurement.X_O0O = zero.X_WO0.inverse() * measurement.pose.X_WO;
+  passes(measurement, check_limits(now.requirements, measurement.X_O0O));
+  return measurement;
+}
+
+}  // namespace zeropose

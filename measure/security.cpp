@@ -1,0 +1,161 @@
+#include "measure/security.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "measure/words.h"
+
+namespace zeropose {
+namespace {
+
+constexpr int white_grey = 254, black_grey = 12;
+constexpr double max_white_share = 0.5;    // of the pixels
+constexpr double min_bright_share = 0.01;  // of the pixels, above black
+
+Verdict good() { return {Code::ok, {}}; }
+
+struct Counts {
+  int marks = 0, cameras = 0;
+  std::vector<int> in_camera;
+};
+
+Counts count_of(const Job& job, std::size_t cameras, std::span<const View> used) {
+  std::vector<bool> seen(job.marks.size());
+  Counts counts;
+  counts.in_camera.assign(cameras, 0);
+  for (const View& view : used) {
+    if (!(job.marks[view.mark].weight > 0)) continue;
+    counts.marks += !seen[view.mark];
+    seen[view.mark] = true;
+    counts.cameras += counts.in_camera[view.camera]++ == 0;
+  }
+  return counts;
+}
+
+bool same(const View& a, const View& b) { return a.camera == b.camera && a.mark == b.mark; }
+
+std::string missing_of(const Job& job, std::span<const CalibratedCamera> cameras,
+                       std::span<const View> used) {
+  std::string names;
+  for (const View& view : job.views) {
+    if (!(job.marks[view.mark].weight > 0)) continue;
+    if (std::any_of(used.begin(), used.end(), [&view](const View& other) { return same(view, other); }))
+      continue;
+    names += (names.empty() ? "" : ", ") + job.marks[view.mark].name + " in " + cameras[view.camera].name;
+  }
+  return names.empty() ? "none is missing" : "missing: " + names;
+}
+
+double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
+  Eigen::Matrix<double, 3, 6> J;
+  J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.X_WO.linear() * p_O_mm);
+  const Eigen::Matrix3d covariance = J * pose.total_covariance * J.transpose();
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly)
+                       .eigenvalues()
+                       .maxCoeff());
+}
+
+struct Place {
+  std::string name;
+  double sigma_mm = 0;
+};
+
+Place worst_place(const Job& job, const PoseResult& pose) {
+  Place worst;
+  const auto consider = [&](const std::string& name, const Eigen::Vector3d& p_O_mm) {
+    const double sigma_mm = sigma_at_mm(pose, p_O_mm);
+    if (!(sigma_mm <= worst.sigma_mm)) worst = {name, sigma_mm};
+  };
+  for (const ApplicationPoint& point : job.application_points) consider(point.name, point.p_O_mm);
+  if (job.application_points.empty())
+    for (const Mark& mark : job.marks) consider(mark.name, mark.p_O_mm);
+  return worst;
+}
+
+}  // namespace
+
+Verdict check_image(const ImageView& image, const std::string& name) {
+  constexpr int stride = 4;
+  std::size_t pixels = 0, white = 0, bright = 0;
+  for (int v = 0; v < image.height_px; v += stride) {
+    const std::uint8_t* row = image.row(v);
+    for (int u = 0; u < image.width_px; u += stride) {
+      ++pixels;
+      white += row[u] >= white_grey;
+      bright += row[u] > black_grey;
+    }
+  }
+  const double count = static_cast<double>(std::max<std::size_t>(pixels, 1));
+  const double white_share = static_cast<double>(white) / count,
+               bright_share = static_cast<double>(bright) / count;
+  if (white_share > max_white_share)
+    return {Code::image_saturated, name + ": " + number(100 * white_share, 0) +
+                                       " % of the picture are white, allowed are " +
+                                       number(100 * max_white_share, 0) + " %"};
+  if (bright_share < min_bright_share)
+    return {Code::image_dark, name + ": " + number(100 * bright_share, 1) +
+                                  " % of the picture are brighter than grey level " + number(black_grey) +
+                                  ", needed are " + number(100 * min_bright_share, 1) + " %"};
+  return good();
+}
+
+Verdict check_marks(const Job& job, std::span<const CalibratedCamera> cameras, std::span<const View> used) {
+  const Requirements& needed = job.requirements;
+  const Counts counts = count_of(job, cameras.size(), used);
+  const int at_least = std::max(needed.min_marks, 3);
+  if (counts.marks < at_least)
+    return {Code::too_few_marks, number(counts.marks) + " marks can be used, " + number(at_least) +
+                                     " are required; " + missing_of(job, cameras, used)};
+  for (const View& view : job.views)
+    if (counts.in_camera[view.camera] < needed.min_marks_per_camera)
+      return {Code::too_few_marks_in_camera,
+              cameras[view.camera].name + " has " + number(counts.in_camera[view.camera]) +
+                  " marks that can be used, " + number(needed.min_marks_per_camera) + " are required; " +
+                  missing_of(job, cameras, used)};
+  if (counts.cameras < needed.min_cameras)
+    return {Code::too_few_cameras, number(counts.cameras) + " cameras have marks that can be used, " +
+                                       number(needed.min_cameras) + " are required; " +
+                                       missing_of(job, cameras, used)};
+  return good();
+}
+
+double worst_sigma_mm(const Job& job, const PoseResult& pose) { return worst_place(job, pose).sigma_mm; }
+
+Verdict check_sigma(const Job& job, const PoseResult& pose) {
+  const double limit = job.requirements.max_sigma_mm;
+  if (limit == 0) return good();
+  const Place worst = worst_place(job, pose);
+  if (worst.sigma_mm <= limit) return good();
+  return {Code::sigma_too_large, "sigma at " + worst.name + " is " + number(worst.sigma_mm, 3) +
+                                     " mm, allowed are " + number(limit, 3) + " mm"};
+}
+
+Verdict check_limits(const Requirements& requirements, const Pose& X_O0O) {
+  struct Axis {
+    Code code;
+    const char* name;
+    const char* unit;
+    double value;
+  };
+  const SixNumbers six = to_six_numbers(X_O0O);
+  const std::array<Axis, 6> axes{{{Code::limit_x, "x", " mm", six.x_mm},
+                                  {Code::limit_y, "y", " mm", six.y_mm},
+                                  {Code::limit_z, "z", " mm", six.z_mm},
+                                  {Code::limit_rx, "rx", " deg", six.rx_deg},
+                                  {Code::limit_ry, "ry", " deg", six.ry_deg},
+                                  {Code::limit_rz, "rz", " deg", six.rz_deg}}};
+  for (std::size_t i = 0; i < axes.size(); ++i) {
+    const Axis& axis = axes[i];
+    const Range& range = requirements.limits[i];
+    if (axis.value >= range.min && axis.value <= range.max) continue;
+    return {axis.code, std::string(axis.name) + " is " + number(axis.value, 4) + axis.unit +
+                           ", allowed are " + number(range.min, 4) + " to " + number(range.max, 4) +
+                           axis.unit};
+  }
+  return good();
+}
+
+}  // namespace zeropose

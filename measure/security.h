@@ -1,0 +1,38 @@
+// The checks between an estimate and a correction that a robot may use (spec 50 M6). Each gives a code and
+// one sentence with its numbers.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "measure/code.h"
+#include "measure/image.h"
+#include "measure/job.h"
+#include "measure/pose.h"
+
+namespace zeropose {
+
+struct Verdict {
+  Code code = Code::internal;
+  std::string reason;  // empty when ok
+};
+
+// M6.1, as far as pixels tell: most of the picture white (image_saturated) or hardly a pixel above black
+// (image_dark). `name` is the camera's.
+Verdict check_image(const ImageView& image, const std::string& name);
+
+// M6.2: marks in all, in each camera of the job, cameras. `used` are the views that count; those of weight 0
+// do not. The reason lists the views that are missing.
+Verdict check_marks(const Job& job, std::span<const CalibratedCamera> cameras, std::span<const View> used);
+
+// The largest sigma, mm, of a pose's error at an application point in any direction, at the worst point;
+// without application points: at the worst mark. From the total covariance.
+double worst_sigma_mm(const Job& job, const PoseResult& pose);
+
+// M6.4.
+Verdict check_sigma(const Job& job, const PoseResult& pose);
+
+// M6.5: each of x y z rx ry rz of X_O0O within its range, ends included.
+Verdict check_limits(const Requirements& requirements, const Pose& X_O0O);
+
+}  // namespace zeropose
