@@ -1,0 +1,173 @@
+#include "daemon/control.h"
+
+#include <openssl/evp.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <nlohmann/json.hpp>
+
+#include "daemon/cycle.h"
+#include "daemon/overlay.h"
+
+namespace zeropose {
+namespace {
+
+using Json = nlohmann::json;
+
+Json six(const Pose& X_AB) {
+  const SixNumbers s = to_six_numbers(X_AB);
+  return {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg};
+}
+
+double milliseconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+Json verdict(Code code, const std::string& reason) {
+  return {{"status", code == Code::ok ? "ok" : "not ok"},
+          {"code", static_cast<int>(code)},
+          {"name", text_of(code).name},
+          {"reason", reason},
+          {"remedy", text_of(code).remedy}};
+}
+
+Json zero_json(const ZeroRecord& record) {
+  Json compensation = Json::array();
+  for (const auto& shift : record.zero.compensation_O_mm)
+    compensation.push_back({shift.x(), shift.y(), shift.z()});
+  return {{"id", record.id},
+          {"time", record.time_utc},
+          {"X_WO0", six(record.zero.X_WO0)},
+          {"compensation_mm", compensation}};
+}
+
+Json status_answer(Cycle& cycle) {
+  const Status status = cycle.status();
+  Json cameras = Json::array();
+  for (const auto& camera : status.cameras)
+    cameras.push_back({{"name", camera.name},
+                       {"alive", camera.state == CameraState::alive},
+                       {"last_problem", camera.last_problem},
+                       {"frames", camera.statistics.frames},
+                       {"timeouts", camera.statistics.timeouts},
+                       {"damaged", camera.statistics.damaged}});
+  Json answer{
+      {"status", "ok"},     {"cell", cycle.cell().name}, {"simulated", cycle.cell().simulated},
+      {"job", status.job},  {"ready", status.ready},     {"cameras_known", status.cameras_known},
+      {"cameras", cameras}, {"cycles", status.cycles},   {"zero_state", verdict(status.zero_code, "")}};
+  if (status.zero) answer["zero"] = zero_json(*status.zero);
+  return answer;
+}
+
+Json mark_json(const Job& job, const Cell& cell, const Measurement& m, std::size_t view) {
+  const MarkFinding& finding = m.findings[view];
+  return {{"mark", job.marks[job.views[view].mark].name},
+          {"camera", cell.cameras[job.views[view].camera].name},
+          {"finding", name_of(finding.status)},
+          {"u_px", finding.u_px.x()},
+          {"v_px", finding.u_px.y()}};
+}
+
+// The findings of the views with the deviations of those that were found: observations are the found views in
+// order.
+Json marks_json(const Job& job, const Cell& cell, const Measurement& m) {
+  Json marks = Json::array();
+  std::size_t observation = 0;
+  for (std::size_t view = 0; view < m.findings.size(); ++view) {
+    Json mark = mark_json(job, cell, m, view);
+    if (m.findings[view].status == MarkStatus::found && observation < m.pose.deviations.size()) {
+      const Deviation& deviation = m.pose.deviations[observation++];
+      mark["dev_px"] = {deviation.dev_px.x(), deviation.dev_px.y()};
+      mark["dev_mm"] = {deviation.dev_mm.x(), deviation.dev_mm.y()};
+      mark["used"] = deviation.used;
+      mark["removed"] = deviation.removed;
+    }
+    marks.push_back(std::move(mark));
+  }
+  return marks;
+}
+
+Json measure_answer(Cycle& cycle) {
+  const MeasureOutcome outcome = cycle.measure_now();
+  const Measurement& m = outcome.measurement;
+  Json answer = verdict(m.code, m.reason);
+  answer["grab_ms"] = milliseconds(outcome.grab);
+  answer["compute_ms"] = milliseconds(outcome.compute);
+  answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
+  if (m.code != Code::ok) return answer;
+  answer["X_O0O"] = six(m.X_O0O);
+  answer["X_WO"] = six(m.pose.X_WO);
+  answer["effective_marks"] = m.pose.effective_marks;
+  answer["effective_cameras"] = m.pose.effective_cameras;
+  answer["largest_deviation_mm"] = m.largest_deviation_mm;
+  answer["sigma_mm"] = m.sigma_mm;
+  return answer;
+}
+
+Json zero_answer(Cycle& cycle) {
+  const ZeroOutcome outcome = cycle.zero_now();
+  Json answer = verdict(outcome.code, outcome.reason);
+  if (outcome.record) answer["zero"] = zero_json(*outcome.record);
+  answer["spread_mm_deg"] = {outcome.spread(0),
+                             outcome.spread(1),
+                             outcome.spread(2),
+                             outcome.spread(3) * degrees_per_radian,
+                             outcome.spread(4) * degrees_per_radian,
+                             outcome.spread(5) * degrees_per_radian};
+  return answer;
+}
+
+std::string base64(const std::vector<std::uint8_t>& bytes) {
+  std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
+  const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()), bytes.data(),
+                                   static_cast<int>(bytes.size()));
+  text.resize(static_cast<std::size_t>(size));
+  return text;
+}
+
+Json snapshot_answer(Cycle& cycle, const std::string& name, bool marks) {
+  const auto& cameras = cycle.cell().cameras;
+  const auto camera =
+      std::find_if(cameras.begin(), cameras.end(), [&](const auto& c) { return c.name == name; });
+  if (camera == cameras.end())
+    return {{"status", "error"}, {"reason", "no camera is called \"" + name + "\""}};
+  const Snapshot snapshot = cycle.snapshot_now(static_cast<std::size_t>(camera - cameras.begin()));
+  Json answer = verdict(code_of(snapshot.grabbed.status), snapshot.grabbed.reason);
+  if (snapshot.grabbed.status != GrabStatus::ok) return answer;
+  answer["png"] = base64(
+      overlay_png(view_of(snapshot.grabbed.frame), marks ? snapshot.marks : std::vector<MarkOverlay>{}));
+  return answer;
+}
+
+Json answer_question(Cycle& cycle, const Json& question) {
+  const std::string cmd = question.at("cmd").get<std::string>();
+  if (cmd == "status") return status_answer(cycle);
+  if (cmd == "measure") return measure_answer(cycle);
+  if (cmd == "zero") return zero_answer(cycle);
+  if (cmd == "snapshot")
+    return snapshot_answer(cycle, question.at("camera").get<std::string>(), question.value("marks", true));
+  return {{"status", "error"},
+          {"reason", "unknown cmd \"" + cmd + "\"; known: status, measure, zero, snapshot"}};
+}
+
+}  // namespace
+
+std::string answer_control(Cycle& cycle, const std::string& line) {
+  try {
+    return answer_question(cycle, Json::parse(line)).dump();
+  } catch (const std::exception& error) {
+    return Json{{"status", "error"}, {"reason", error.what()}}.dump();
+  }
+}
+
+std::filesystem::path default_control_socket() {
+  if (const char* runtime = std::getenv("RUNTIME_DIRECTORY"))
+    return std::filesystem::path(runtime) / "control.sock";
+  if (::geteuid() == 0) return "/run/zeropose/control.sock";
+  if (const char* runtime = std::getenv("XDG_RUNTIME_DIR"))
+    return std::filesystem::path(runtime) / "zeropose/control.sock";
+  return "/tmp/zeropose-" + std::to_string(::geteuid()) + "/control.sock";
+}
+
+}  // namespace zeropose

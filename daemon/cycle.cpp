@@ -1,0 +1,374 @@
+#include "daemon/cycle.h"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <future>
+#include <numeric>
+
+namespace zeropose {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto idle_period = 100ms;     // how often the cell's state is looked at when nothing is asked
+constexpr auto compute_reserve = 25ms;  // of the deadline, kept for measuring and publishing
+
+std::vector<std::size_t> cameras_of(const Job& job) {
+  std::vector<std::size_t> cameras;
+  for (const View& view : job.views) cameras.push_back(view.camera);
+  std::sort(cameras.begin(), cameras.end());
+  cameras.erase(std::unique(cameras.begin(), cameras.end()), cameras.end());
+  return cameras;
+}
+
+std::vector<CameraImage> images_of(std::span<const std::size_t> cameras, std::span<const Frame> frames) {
+  std::vector<CameraImage> images;
+  for (std::size_t i = 0; i < cameras.size(); ++i) images.push_back({cameras[i], view_of(frames[i])});
+  return images;
+}
+
+struct Failure {
+  Code code = Code::ok;
+  std::string reason;
+};
+
+// Moves the frames out when all are there; else the code of the first camera that failed and the reasons of
+// all.
+Failure take_frames(std::vector<GrabResult>& results, std::vector<Frame>& frames) {
+  Failure failure;
+  for (auto& result : results) {
+    if (result.status == GrabStatus::ok) {
+      frames.push_back(std::move(result.frame));
+      continue;
+    }
+    if (failure.code == Code::ok) failure.code = code_of(result.status);
+    failure.reason += (failure.reason.empty() ? "" : "; ") + result.reason;
+  }
+  if (failure.code != Code::ok) frames.clear();
+  return failure;
+}
+
+void log_change(const CameraStatus& camera) {
+  if (camera.state == CameraState::alive)
+    spdlog::info("{} is there", camera.name);
+  else
+    spdlog::warn("{} is missing: {}", camera.name, camera.last_problem);
+}
+
+long microseconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration_cast<std::chrono::microseconds>(time).count();
+}
+
+std::string hex(std::uint32_t number) { return fmt::format("{:08x}", number); }
+
+}  // namespace
+
+ImageView view_of(const Frame& frame) {
+  return {frame.pixels.data(), frame.width_px, frame.height_px, frame.width_px};
+}
+
+Cycle::Cycle(Cell cell, std::filesystem::path state)
+    : cell_(std::move(cell)), state_(std::move(state)), grabber_(cell_.cameras) {
+  load_zeros();
+}
+
+Cycle::~Cycle() { stop(); }
+
+// A damaged zero is no reason not to run: the cell is not ready and says so.
+std::optional<ZeroRecord> Cycle::load_or_complain(const Job& job, Code& code) const {
+  try {
+    return load_zero(state_, job.name);
+  } catch (const std::exception& error) {
+    spdlog::error("the zero of job {} cannot be used: {}", job.name, error.what());
+    code = Code::storage_failed;
+    return std::nullopt;
+  }
+}
+
+void Cycle::load_zeros() {
+  std::filesystem::create_directories(state_);
+  zeros_.resize(cell_.jobs.size());
+  zero_codes_.assign(cell_.jobs.size(), Code::zero_missing);
+  for (std::size_t i = 0; i < cell_.jobs.size(); ++i) {
+    const auto record = load_or_complain(cell_.jobs[i], zero_codes_[i]);
+    if (!record) continue;
+    const bool current =
+        record->config_hash == cell_.config_hash && record->calibration_hash == cell_.calibration_hash;
+    zero_codes_[i] = current ? Code::ok : Code::zero_outdated;
+    if (current) {
+      zeros_[i] = record;
+      spdlog::info("job {}: zero {} of {}", cell_.jobs[i].name, hex(record->id), record->time_utc);
+    } else {
+      spdlog::warn(
+          "job {}: the zero of {} belongs to another config or calibration and is not used; take a new zero",
+          cell_.jobs[i].name, record->time_utc);
+    }
+  }
+}
+
+void Cycle::start() {
+  last_progress_ = Clock::now();
+  thread_ = std::thread([this] { run(); });
+}
+
+void Cycle::stop() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  wake_.notify_all();
+  if (thread_.joinable()) thread_.join();
+}
+
+void Cycle::enqueue(const Request& request) {
+  {
+    const std::lock_guard lock(mutex_);
+    robot_tasks_.push_back([this, request] { carry_out(request); });
+  }
+  wake_.notify_all();
+}
+
+template <typename Result>
+Result Cycle::run_between(std::function<Result()> work) {
+  auto task = std::make_shared<std::packaged_task<Result()>>(std::move(work));
+  std::future<Result> result = task->get_future();
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_) throw std::runtime_error("the daemon is stopping");
+    other_tasks_.push_back([task] { (*task)(); });
+  }
+  wake_.notify_all();
+  return result.get();
+}
+
+std::optional<Cycle::Task> Cycle::next_task() {
+  std::unique_lock lock(mutex_);
+  wake_.wait_for(lock, idle_period,
+                 [this] { return stopping_ || !robot_tasks_.empty() || !other_tasks_.empty(); });
+  auto& tasks = robot_tasks_.empty() ? other_tasks_ : robot_tasks_;
+  if (stopping_ || tasks.empty()) return std::nullopt;
+  Task task = std::move(tasks.front());
+  tasks.pop_front();
+  return task;
+}
+
+void Cycle::run() {
+  for (;;) {
+    last_progress_ = Clock::now();
+    refresh();
+    const auto task = next_task();
+    if (task) (*task)();
+    const std::lock_guard lock(mutex_);
+    if (!stopping_) continue;
+    other_tasks_.clear();  // breaks the promises of those who wait
+    return;
+  }
+}
+
+// Looks at cameras and zero and tells the links and whoever asks for the status.
+void Cycle::refresh() {
+  const Job& job = cell_.jobs[selected_];
+  Status now;
+  now.job = job.name;
+  now.zero = zeros_[selected_];
+  now.zero_code = zero_codes_[selected_];
+  now.cameras_known = true;
+  for (std::size_t i = 0; i < grabber_.size(); ++i) {
+    const CameraWorker& worker = grabber_.camera(i);
+    now.cameras.push_back(
+        {cell_.cameras[i].name, worker.state(), worker.last_problem(), worker.statistics()});
+    now.cameras_known = now.cameras_known && now.cameras[i].state != CameraState::opening;
+  }
+  CellState cell;
+  cell.config_valid = true;
+  const auto cameras = cameras_of(job);
+  cell.cameras_alive = std::all_of(cameras.begin(), cameras.end(), [&now](std::size_t i) {
+    return now.cameras[i].state == CameraState::alive;
+  });
+  cell.zero_valid = now.zero.has_value();
+  cell.simulated = cell_.simulated;
+  cell.config_hash = cell_.config_hash;
+  cell.calibration_hash = cell_.calibration_hash;
+  cell.zero_id = now.zero ? now.zero->id : 0;
+  now.ready = cell.cameras_alive && cell.zero_valid;
+  for (RobotLink* link : links_) link->set_cell_state(cell);
+
+  const std::lock_guard lock(mutex_);
+  for (std::size_t i = 0; i < status_.cameras.size(); ++i)
+    if (status_.cameras[i].state != now.cameras[i].state) log_change(now.cameras[i]);
+  now.cycles = status_.cycles;
+  status_ = std::move(now);
+}
+
+Status Cycle::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+void Cycle::carry_out(const Request& request) {
+  if (request.kind == CommandKind::reset) return refresh();  // the handshake answers it by itself
+  Report report;
+  try {
+    report = report_for(request);
+  } catch (const std::exception& error) {
+    spdlog::error("request {}: {}", request.id, error.what());
+  }
+  report.request_id = request.id;
+  report.ticket = request.ticket;
+  refresh();  // a new zero or job is known to the robot before the answer is
+  links_.at(request.robot)->publish(report);
+  const std::lock_guard lock(mutex_);
+  ++status_.cycles;
+}
+
+Report Cycle::report_for(const Request& request) {
+  Report report;
+  switch (request.kind) {
+    case CommandKind::measure: {
+      if (request.job != cell_.jobs[selected_].number) {
+        report.code = Code::unknown_job;
+        spdlog::warn("request {}: measures job {}, but {} is selected", request.id, request.job,
+                     cell_.jobs[selected_].number);
+        return report;
+      }
+      RobotLink& link = *links_.at(request.robot);
+      const RobotOptions& robot = cell_.robots.at(request.robot);
+      const auto outcome = measure(request.deadline, [&] { link.exposure_done(request.id); });
+      const Measurement& m = outcome.measurement;
+      report.code = m.code;
+      report.effective_marks = m.pose.effective_marks;
+      report.effective_cameras = m.pose.effective_cameras;
+      report.largest_deviation_mm = m.largest_deviation_mm;
+      report.sigma_mm = m.sigma_mm;
+      if (m.code == Code::ok)
+        report.correction = correction(robot.frame, robot.X_WR, zeros_[selected_]->zero.X_WO0, m.pose.X_WO);
+      spdlog::info("{} request {}: code {} {}{}, grab {} us, compute {} us", robot.name, request.id,
+                   static_cast<int>(m.code), text_of(m.code).name,
+                   m.reason.empty() ? "" : " (" + m.reason + ")", microseconds(outcome.grab),
+                   microseconds(outcome.compute));
+      return report;
+    }
+    case CommandKind::zero: {
+      const auto outcome = take_zero(request.deadline);
+      report.code = outcome.code;
+      return report;
+    }
+    case CommandKind::select_job: {
+      const auto job = std::find_if(cell_.jobs.begin(), cell_.jobs.end(),
+                                    [&](const Job& j) { return j.number == request.job; });
+      report.code = job == cell_.jobs.end() ? Code::unknown_job : Code::ok;
+      if (job != cell_.jobs.end()) selected_ = static_cast<std::size_t>(job - cell_.jobs.begin());
+      return report;
+    }
+    default:
+      report.code = Code::unknown_command;
+      return report;
+  }
+}
+
+MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& on_exposed) {
+  const Job& job = cell_.jobs[selected_];
+  MeasureOutcome outcome;
+  outcome.job = &job;
+  Measurement& m = outcome.measurement;
+  const auto& zero = zeros_[selected_];
+  if (!zero) {
+    m.code = zero_codes_[selected_];
+    m.reason = "job " + job.name + " has no valid zero";
+    return outcome;
+  }
+  const auto cameras = cameras_of(job);
+  const auto start = Clock::now();
+  auto results = grabber_.grab(cameras, deadline - compute_reserve);
+  const auto grabbed = Clock::now();
+  outcome.grab = grabbed - start;
+  if (const Failure failure = take_frames(results, outcome.frames); failure.code != Code::ok) {
+    m.code = failure.code;
+    m.reason = failure.reason;
+    return outcome;
+  }
+  on_exposed();
+  m = zeropose::measure(images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero);
+  outcome.compute = Clock::now() - grabbed;
+  return outcome;
+}
+
+ZeroOutcome Cycle::take_zero(TimePoint deadline) {
+  const Job& job = cell_.jobs[selected_];
+  const auto cameras = cameras_of(job);
+  std::vector<std::vector<Observation>> observations;
+  for (int i = 0; i < cell_.zero_frames; ++i) {
+    last_progress_ = Clock::now();
+    std::vector<Frame> frames;
+    auto results =
+        grabber_.grab(cameras, std::min(deadline - compute_reserve, Clock::now() + cell_.deadline));
+    if (const Failure failure = take_frames(results, frames); failure.code != Code::ok)
+      return {failure.code, failure.reason, {}, Vector6::Zero()};
+    const auto findings =
+        find_job_marks(images_of(cameras, frames), job, cell_.calibration, job.X_WO_nominal);
+    observations.push_back(observations_of(findings, job));
+  }
+  const ZeroResult result = make_zero(cell_.calibration, job, observations);
+  ZeroOutcome outcome{result.code, result.reason, {}, result.spread};
+  if (result.code == Code::ok) keep(job, result, outcome);
+  return outcome;
+}
+
+// A zero counts once it is safely on disk, not before.
+void Cycle::keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome) {
+  ZeroRecord record;
+  record.job = job.name;
+  record.zero = result.zero;
+  record.spread = result.spread;
+  record.frames = cell_.zero_frames;
+  record.config_hash = cell_.config_hash;
+  record.calibration_hash = cell_.calibration_hash;
+  record.time_utc = iso8601_utc(std::chrono::system_clock::now());
+  try {
+    record.id = save_zero(state_, record);
+  } catch (const std::exception& error) {
+    spdlog::error("the zero is not saved: {}", error.what());
+    outcome.code = Code::storage_failed;
+    outcome.reason = error.what();
+    return;
+  }
+  outcome.record = zeros_[selected_] = record;
+  zero_codes_[selected_] = Code::ok;
+  spdlog::info("job {}: zero {} taken", job.name, hex(record.id));
+}
+
+MeasureOutcome Cycle::measure_now() {
+  return run_between<MeasureOutcome>([this] { return measure(Clock::now() + cell_.deadline, [] {}); });
+}
+
+ZeroOutcome Cycle::zero_now() {
+  return run_between<ZeroOutcome>([this] {
+    auto outcome = take_zero(Clock::now() + cell_.zero_deadline);
+    refresh();
+    return outcome;
+  });
+}
+
+Snapshot Cycle::snapshot_now(std::size_t camera) {
+  return run_between<Snapshot>([this, camera] { return snapshot(camera); });
+}
+
+Snapshot Cycle::snapshot(std::size_t camera) {
+  const Job& job = cell_.jobs[selected_];
+  const std::size_t cameras[] = {camera};
+  Snapshot snapshot{std::move(grabber_.grab(cameras, Clock::now() + cell_.deadline).front()), {}};
+  if (snapshot.grabbed.status != GrabStatus::ok) return snapshot;
+  const auto& zero = zeros_[selected_];
+  const Pose X_WO_expected = zero ? zero->zero.X_WO0 : job.X_WO_nominal;
+  const auto searches = job_searches(job, cell_.calibration, X_WO_expected);
+  const auto findings =
+      find_job_marks(images_of(cameras, {&snapshot.grabbed.frame, 1}), job, cell_.calibration, X_WO_expected);
+  for (std::size_t i = 0; i < job.views.size(); ++i)
+    if (job.views[i].camera == camera)
+      snapshot.marks.push_back({job.marks[job.views[i].mark].name, searches[i], findings[i]});
+  return snapshot;
+}
+
+}  // namespace zeropose

@@ -1,0 +1,126 @@
+// The cycle: command -> grab -> measure -> report, one after the other in a thread of its own (spec 90).
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <thread>
+
+#include "config/cell.h"
+#include "config/records.h"
+#include "daemon/grab.h"
+#include "daemon/overlay.h"
+#include "measure/measurement.h"
+#include "protocol/robot_link.h"
+
+namespace zeropose {
+
+// One measurement with the frames it was made from.
+struct MeasureOutcome {
+  const Job* job = nullptr;  // of the cell
+  Measurement measurement;
+  std::vector<Frame> frames;  // in the order of the job's cameras; empty when the grab failed
+  std::chrono::nanoseconds grab{}, compute{};
+};
+
+struct ZeroOutcome {
+  Code code = Code::internal;
+  std::string reason;
+  std::optional<ZeroRecord> record;
+  Vector6 spread = Vector6::Zero();  // mm, rad
+};
+
+// One frame of a camera with what the selected job finds in it.
+struct Snapshot {
+  GrabResult grabbed;
+  std::vector<MarkOverlay> marks;
+};
+
+struct CameraStatus {
+  std::string name;
+  CameraState state = CameraState::opening;
+  std::string last_problem;
+  CameraStatistics statistics;
+};
+
+struct Status {
+  std::string job;
+  bool ready = false;  // a Measure would be taken now
+  Code zero_code = Code::zero_missing;
+  std::optional<ZeroRecord> zero;
+  std::vector<CameraStatus> cameras;
+  bool cameras_known = false;  // every camera was tried at least once
+  std::uint64_t cycles = 0;    // requests of robots carried out
+};
+
+ImageView view_of(const Frame& frame);
+
+class Cycle {
+ public:
+  // Opens the cameras in the background and reads the zeros from the state directory.
+  Cycle(Cell cell, std::filesystem::path state);
+  ~Cycle();
+  Cycle(const Cycle&) = delete;
+  Cycle& operator=(const Cycle&) = delete;
+
+  // Call for every robot in the order of the cell, then start(). The links must outlive stop().
+  void add_link(RobotLink& link) { links_.push_back(&link); }
+  void start();
+  void stop();
+
+  // Takes over a robot's request; does not wait for it.
+  void enqueue(const Request& request);
+
+  // For the command line: run between the robots' requests and wait for the outcome. Never seen by a robot.
+  MeasureOutcome measure_now();
+  ZeroOutcome zero_now();
+  Snapshot snapshot_now(std::size_t camera);
+
+  Status status() const;
+  const Cell& cell() const { return cell_; }
+  // When the cycle thread last came round; the watchdog is fed from it.
+  TimePoint last_progress() const { return last_progress_.load(); }
+
+ private:
+  using Task = std::function<void()>;
+
+  void run();
+  std::optional<Task> next_task();
+  template <typename Result>
+  Result run_between(std::function<Result()> work);
+  void refresh();
+
+  void carry_out(const Request& request);
+  Report report_for(const Request& request);
+  MeasureOutcome measure(TimePoint deadline, const std::function<void()>& on_exposed);
+  ZeroOutcome take_zero(TimePoint deadline);
+  void keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome);
+  Snapshot snapshot(std::size_t camera);
+  void load_zeros();
+  std::optional<ZeroRecord> load_or_complain(const Job& job, Code& code) const;
+
+  const Cell cell_;
+  const std::filesystem::path state_;
+  std::vector<RobotLink*> links_;
+  Grabber grabber_;
+
+  // Only the cycle thread touches these once it runs.
+  std::size_t selected_ = 0;                      // job
+  std::vector<std::optional<ZeroRecord>> zeros_;  // one per job
+  std::vector<Code> zero_codes_;                  // why there is none
+
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Task> robot_tasks_, other_tasks_;
+  Status status_;
+  bool stopping_ = false;
+  std::atomic<TimePoint> last_progress_{};
+  std::thread thread_;
+};
+
+}  // namespace zeropose

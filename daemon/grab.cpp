@@ -1,0 +1,37 @@
+#include "daemon/grab.h"
+
+namespace zeropose {
+
+Code code_of(GrabStatus status) {
+  switch (status) {
+    case GrabStatus::ok:
+      return Code::ok;
+    case GrabStatus::missing:
+      return Code::camera_missing;
+    case GrabStatus::timeout:
+      return Code::frame_timeout;
+    case GrabStatus::damaged:
+      return Code::frame_damaged;
+    case GrabStatus::wrong_size:
+      return Code::frame_wrong_size;
+  }
+  return Code::internal;
+}
+
+Grabber::Grabber(const std::vector<CameraOptions>& cameras) {
+  for (const auto& camera : cameras) workers_.push_back(std::make_unique<CameraWorker>(camera));
+}
+
+Grabber::~Grabber() {
+  for (const auto& worker : workers_) worker->request_stop();
+}
+
+std::vector<GrabResult> Grabber::grab(std::span<const std::size_t> cameras, TimePoint deadline) {
+  std::vector<CameraWorker::Pending> pending;
+  for (const std::size_t camera : cameras) pending.push_back(workers_[camera]->request(deadline));
+  std::vector<GrabResult> results;
+  for (auto& request : pending) results.push_back(request.wait());
+  return results;
+}
+
+}  // namespace zeropose

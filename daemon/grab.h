@@ -1,0 +1,30 @@
+// One frame of each camera wanted, exposed after now, by the deadline.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "drivers/camera_worker.h"
+#include "measure/code.h"
+
+namespace zeropose {
+
+Code code_of(GrabStatus status);
+
+class Grabber {
+ public:
+  explicit Grabber(const std::vector<CameraOptions>& cameras);
+  ~Grabber();  // the waits for lost devices run side by side
+
+  // Triggers all at once and waits for all. In the order of the indices; the answer is there at the deadline.
+  std::vector<GrabResult> grab(std::span<const std::size_t> cameras, TimePoint deadline);
+
+  std::size_t size() const { return workers_.size(); }
+  const CameraWorker& camera(std::size_t index) const { return *workers_[index]; }
+
+ private:
+  std::vector<std::unique_ptr<CameraWorker>> workers_;
+};
+
+}  // namespace zeropose

@@ -1,0 +1,24 @@
+// A frame as a PNG with what was looked for and found drawn in.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "measure/image.h"
+#include "measure/marks.h"
+
+namespace zeropose {
+
+struct MarkOverlay {
+  std::string name;
+  MarkSearch search;
+  MarkFinding finding;
+};
+
+// PNG bytes: search areas in blue, found outlines and centres in green, what was not found in red with its
+// reason.
+std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const MarkOverlay> marks);
+
+}  // namespace zeropose
