@@ -1,0 +1,57 @@
+#include "sim/scene.h"
+
+#include <algorithm>
+
+#include "config/config_error.h"
+#include "sim/sim_file.h"
+
+namespace zeropose {
+namespace {
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+// The true cameras in the cell's order; adds what does not fit to the mistakes.
+std::vector<CalibratedCamera> in_order(const std::vector<CameraOptions>& wanted,
+                                       const std::vector<CalibratedCamera>& known, const std::string& file,
+                                       std::vector<std::string>& mistakes) {
+  std::vector<CalibratedCamera> ordered;
+  for (const CameraOptions& camera : wanted) {
+    const auto truth = std::ranges::find(known, camera.name, &CalibratedCamera::name);
+    const std::string key = file + ": cameras." + camera.name + ": ";
+    if (truth == known.end()) {
+      mistakes.push_back(key + "missing, expected the true camera of that name in the cell file");
+      continue;
+    }
+    if (truth->model.width_px != camera.width_px || truth->model.height_px != camera.height_px)
+      mistakes.push_back(key + "found " + size_text(truth->model.width_px, truth->model.height_px) +
+                         " px, expected " + size_text(camera.width_px, camera.height_px) +
+                         " px as in the cell file");
+    ordered.push_back(*truth);
+  }
+  for (const CalibratedCamera& camera : known)
+    if (std::ranges::find(wanted, camera.name, &CameraOptions::name) == wanted.end())
+      mistakes.push_back(file + ": cameras." + camera.name +
+                         ": unknown, expected only cameras of the cell file");
+  return ordered;
+}
+
+}  // namespace
+
+Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
+  const SimFile truth = load_sim_file(sim_file);
+  std::vector<std::string> mistakes;
+  Scene scene;
+  scene.cameras = in_order(cell.cameras, truth.cameras, sim_file.string(), mistakes);
+  if (cell.jobs.empty()) mistakes.push_back("the cell has no job, expected one whose marks can be rendered");
+  if (!mistakes.empty()) throw ConfigError(mistakes);
+  const Job& job = cell.jobs.front();
+  scene.marks = job.marks;
+  scene.views = job.views;
+  scene.X_WO_nominal = job.X_WO_nominal;
+  scene.picture = truth.picture;
+  return scene;
+}
+
+}  // namespace zeropose

@@ -1,0 +1,48 @@
+// What is true about a simulated cell: its cameras, the marks on the object and how the picture looks.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "calib/camera_model.h"
+#include "config/cell.h"
+#include "measure/job.h"
+
+namespace zeropose {
+
+// Grey levels are those at the middle of the picture, where the illumination is 1.
+struct PictureSettings {
+  double surface_grey = 165;           // of the plates the marks sit on; each plate differs by a few per cent
+  double mark_grey = 60;               // of dark discs; a bright disc has the surface's grey, its plate this
+  double illumination_gradient = 0.3;  // change over the picture's diagonal, relative
+  double blur_sigma_px = 0.7;          // Gaussian
+  double noise_sigma_grey = 2;
+  int clutter = 12;  // per camera, at most: what finds no place clear of the marks is left out
+  std::uint64_t seed = 1;
+};
+
+// The true cameras, in the order of the cell's cameras, and the job's marks and views.
+struct Scene {
+  std::vector<CalibratedCamera> cameras;
+  std::vector<Mark> marks;
+  std::vector<View> views;
+  Pose X_WO_nominal = Pose::Identity();
+  PictureSettings picture;
+};
+
+// What is wrong with the marks for a while.
+struct Faults {
+  std::set<std::string> covered;               // names of marks that are hidden
+  std::map<std::string, double> displaced_px;  // marks that sit off their place: by so much to the right in
+                                               // the image, at the same distance
+};
+
+// The scene of the cell's first job with the truth of the file CELL.sim.json. Throws ConfigError: names file
+// and key path of every mistake, also cameras that only one of both knows.
+Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file);
+
+}  // namespace zeropose

@@ -1,0 +1,27 @@
+// The file CELL.sim.json: what is true about a simulated cell, as plain values.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "calib/camera_model.h"
+#include "sim/scene.h"
+
+namespace zeropose {
+
+struct SimFile {
+  std::vector<CalibratedCamera> cameras;  // in the order of the file
+  PictureSettings picture;
+};
+
+// JSON with comments. Throws ConfigError with all mistakes: unreadable file, unknown or missing keys, wrong
+// types, values out of range.
+SimFile load_sim_file(const std::filesystem::path& path);
+
+// A calibration file of these cameras with `comment` as its first line.
+std::string calibration_text(std::span<const CalibratedCamera> cameras, std::string_view comment);
+
+}  // namespace zeropose
