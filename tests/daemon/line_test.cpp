@@ -1,0 +1,259 @@
+// The walking line as a whole: real cameras on loopback, the daemon as systemd starts it, a robot that checks
+// everything.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+#include <random>
+
+#include "tests/support/netns.h"
+#include "tests/support/walking_line.h"
+
+namespace zeropose {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+constexpr std::uint16_t job = 1;
+constexpr double max_error_mm = 0.4,
+                 max_error_deg = 0.012;  // of each car with the wrong calibration of seed 1
+
+Pose random_shift(std::mt19937_64& generator) {
+  std::uniform_real_distribution<double> mm(-30, 30), deg(-0.2, 0.2);
+  return from_six_numbers(
+      {mm(generator), mm(generator), mm(generator), deg(generator), deg(generator), deg(generator)});
+}
+
+class Line : public testing::Test {
+ protected:
+  void start_all() {
+    line.start_cell();
+    line.start_daemon();
+    line.take_zero();
+  }
+
+  // One fault-free car: valid and right.
+  void expect_good_car(const Pose& X_WO) {
+    line.shift(X_WO);
+    const RobotAnswer answer = line.robot().measure(job, 1);
+    ASSERT_TRUE(answer.ok()) << answer.refusal << " code " << answer.code << '\n' << line.daemon_log();
+    expect_right(X_WO, answer);
+    EXPECT_TRUE(line.robot().acknowledge().ok());
+  }
+
+  void expect_right(const Pose& X_WO, const RobotAnswer& answer) {
+    const Vector6 error = difference(X_WO, line.shift_from(*answer.correction));
+    EXPECT_LT(error.head<3>().cwiseAbs().maxCoeff(), max_error_mm);
+    EXPECT_LT(error.tail<3>().cwiseAbs().maxCoeff() * degrees_per_radian, max_error_deg);
+  }
+
+  void expect_code(Code code) {
+    const RobotAnswer answer = line.robot().measure(job, 1);
+    EXPECT_FALSE(answer.correction.has_value());
+    EXPECT_EQ(answer.code, static_cast<std::uint16_t>(code)) << answer.refusal << '\n' << line.daemon_log();
+  }
+
+  // The code of the first answer that is no longer `before`, within the patience.
+  std::uint16_t code_after(Code before, std::chrono::seconds patience) {
+    const auto deadline = std::chrono::steady_clock::now() + patience;
+    std::uint16_t code = 0;
+    do {
+      const RobotAnswer answer = line.robot().measure(job, 1);
+      code = answer.code;
+      if (code != static_cast<std::uint16_t>(before) || answer.ok()) return code;
+      std::this_thread::sleep_for(100ms);
+    } while (std::chrono::steady_clock::now() < deadline);
+    return code;
+  }
+
+  WalkingLine line;
+  std::mt19937_64 generator{7};
+};
+
+TEST_F(Line, FaultFreeCarsAreAllValidAndRight) {
+  start_all();
+  for (int car = 0; car < 5; ++car) expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, RobotTakesTheZeroAndMeasures) {
+  line.start_cell();
+  line.start_daemon();
+  line.wait_until_alive();
+  expect_code(Code::zero_missing);
+  const RobotAnswer zero = line.robot().zero(job);
+  ASSERT_TRUE(zero.ok()) << zero.refusal << " code " << zero.code << '\n' << line.daemon_log();
+  EXPECT_NE(line.robot().read().block.zero_id, 0u);
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, CoveredMarkIsLeftOutAndTheResultStaysRight) {
+  start_all();
+  line.fault("cover-mark", {{"mark", "camera2/2"}});
+  const Pose X_WO = random_shift(generator);
+  line.shift(X_WO);
+  const RobotAnswer answer = line.robot().measure(job, 1);
+  ASSERT_TRUE(answer.ok()) << answer.refusal << line.daemon_log();
+  EXPECT_EQ(answer.block.effective_marks, 11);
+  expect_right(X_WO, answer);
+  line.fault("clear");
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, WrongMarkIsNamedAndRemoved) {
+  start_all();
+  line.fault("wrong-mark", {{"mark", "camera3/1"}, {"px", 20}});
+  const Pose X_WO = random_shift(generator);
+  line.shift(X_WO);
+  const RobotAnswer answer = line.robot().measure(job, 1);
+  ASSERT_TRUE(answer.ok()) << answer.refusal << line.daemon_log();
+  EXPECT_EQ(answer.block.effective_marks, 11);
+  expect_right(X_WO, answer);
+  const Json measured = line.ask_daemon({{"cmd", "measure"}});
+  for (const auto& mark : measured["marks"]) EXPECT_EQ(mark["removed"], mark["mark"] == "camera3/1") << mark;
+  EXPECT_THAT(line.zeropose({"measure"}).out, HasSubstr("camera3/1: removed as wrong"));
+  line.fault("clear");
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, ResultOutsideALimitIsRefusedWithItsAxis) {
+  start_all();
+  line.shift(from_six_numbers({45, 0, 0, 0, 0, 0}));
+  expect_code(Code::limit_x);
+  line.shift(from_six_numbers({0, -45, 0, 0, 0, 0}));
+  expect_code(Code::limit_y);
+  line.shift(from_six_numbers({0, 0, 0, 0, 0, 0.7}));
+  expect_code(Code::limit_rz);
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, CameraKilledInMidGrabAndBackAgain) {
+  start_all();
+  line.fault("camera-dead", {{"camera", "camera3"}});
+  const RobotAnswer answer = line.robot().measure(job, 1);
+  EXPECT_FALSE(answer.correction.has_value());
+  EXPECT_TRUE(answer.code == static_cast<int>(Code::camera_missing) ||
+              answer.code == static_cast<int>(Code::frame_timeout))
+      << answer.code << '\n'
+      << line.daemon_log();
+  EXPECT_LE(answer.to_answer, 550ms);
+  line.fault("camera-back", {{"camera", "camera3"}});
+  const auto back = std::chrono::steady_clock::now();
+  while (line.ask_daemon({{"cmd", "status"}})["ready"] != true &&
+         std::chrono::steady_clock::now() - back < 20s)
+    std::this_thread::sleep_for(50ms);
+  EXPECT_LE(std::chrono::steady_clock::now() - back, 10s);
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, CameraMissingAtTheStartIsNoRestartLoop) {
+  line.start_cell();
+  line.fault("camera-dead", {{"camera", "camera2"}});
+  line.start_daemon();
+  EXPECT_THAT(line.zeropose({"status"}).out, HasSubstr("camera2: MISSING"));
+  EXPECT_EQ(line.zeropose({"zero"}).status, 1);
+  expect_code(Code::camera_missing);
+  line.fault("camera-back", {{"camera", "camera2"}});
+  line.take_zero();
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, ZeroSurvivesARestartAndNothingIsValidAtFirst) {
+  start_all();
+  expect_good_car(random_shift(generator));
+  const RobotAnswer before = line.robot().read();
+  EXPECT_EQ(line.stop_daemon(), 0);
+  line.start_daemon();
+  line.wait_until_alive();
+  const RobotAnswer after = line.robot().read();
+  EXPECT_NE(after.block.epoch, before.block.epoch);
+  EXPECT_EQ(after.block.zero_id, before.block.zero_id);
+  EXPECT_FALSE(after.block.has(status_bit::result_valid));
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, DamagedZeroIsNotUsed) {
+  start_all();
+  EXPECT_EQ(line.stop_daemon(), 0);
+  const auto file = line.state() / "zero-body.json";
+  ASSERT_TRUE(std::filesystem::exists(file));
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  line.start_daemon();
+  line.wait_until_alive();
+  EXPECT_THAT(line.zeropose({"status"}).out, HasSubstr("NOT READY"));
+  expect_code(Code::zero_missing);
+  line.take_zero();
+  expect_good_car(random_shift(generator));
+}
+
+TEST_F(Line, StateThatCannotBeWrittenIsNoZero) {
+  line.start_cell();
+  line.start_daemon();
+  line.wait_until_alive();
+  std::filesystem::remove_all(line.state());
+  std::ofstream(line.state()) << "a file where the directory was";
+  const Finished zero = line.zeropose({"zero", "--json"});
+  EXPECT_EQ(zero.status, 1);
+  EXPECT_EQ(Json::parse(zero.out)["code"], static_cast<int>(Code::storage_failed));
+  expect_code(Code::zero_missing);
+}
+
+TEST_F(Line, WatchdogIsFedAndSigtermEndsCleanly) {
+  line.start_cell();
+  line.start_daemon();
+  EXPECT_TRUE(line.notify().heard("WATCHDOG=1", 5s));
+  EXPECT_TRUE(line.notify().heard("WATCHDOG=1", 5s));
+  const auto asked = std::chrono::steady_clock::now();
+  EXPECT_EQ(line.stop_daemon(), 0);
+  EXPECT_LT(std::chrono::steady_clock::now() - asked, 15s);
+  EXPECT_TRUE(line.notify().heard("STOPPING=1", 1s));
+}
+
+TEST_F(Line, SnapshotIsAPngAndAnUnknownCameraIsAnError) {
+  start_all();
+  const TemporaryFolder folder;
+  const Finished good =
+      line.zeropose({"snapshot", "--camera", "camera1", "--out", (folder / "a.png").string()});
+  EXPECT_EQ(good.status, 0) << good.err;
+  std::ifstream file(folder / "a.png", std::ios::binary);
+  std::string head(8, ' ');
+  file.read(head.data(), 8);
+  EXPECT_EQ(head, "\x89PNG\r\n\x1a\n");
+  const Finished wrong =
+      line.zeropose({"snapshot", "--camera", "camera9", "--out", (folder / "b.png").string()});
+  EXPECT_EQ(wrong.status, 1);
+  EXPECT_THAT(wrong.out, HasSubstr("camera9"));
+}
+
+TEST(Daemon, WrongConfigEndsWithStatus2) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "cell.json") << "{ \"name\": 5 }";
+  const Finished finished =
+      run_program({std::string(ZEROPOSE_BIN_DIR) + "/zeroposed", "--cell", (folder / "cell.json").string()});
+  EXPECT_EQ(finished.status, 2);
+  EXPECT_THAT(finished.err, HasSubstr("name"));
+}
+
+TEST(Daemon, StatusWithoutADaemonSaysSo) {
+  const Finished finished = run_program(
+      {std::string(ZEROPOSE_BIN_DIR) + "/zeropose", "status", "--socket", "/tmp/no-such-folder/x.sock"});
+  EXPECT_EQ(finished.status, 2);
+  EXPECT_THAT(finished.err, HasSubstr("is the program running?"));
+}
+
+}  // namespace
+}  // namespace zeropose
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  const std::vector<std::string> addresses = {"127.0.0.11", "127.0.0.12", "127.0.0.13", "127.0.0.14"};
+  const bool listing = testing::GTEST_FLAG(list_tests);
+  const std::string problem = listing ? "" : zeropose::enter_private_network(addresses);
+  if (!problem.empty()) {
+    std::printf("skipped: no private network for the test: %s\n", problem.c_str());
+    return 77;
+  }
+  return RUN_ALL_TESTS();
+}

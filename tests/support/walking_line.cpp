@@ -1,0 +1,121 @@
+#include "tests/support/walking_line.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+namespace zeropose {
+namespace {
+
+using namespace std::chrono_literals;
+using Json = nlohmann::json;
+
+constexpr auto start_patience = 60s;  // sanitizers are slow
+
+std::string program(const std::string& name) { return std::string(ZEROPOSE_BIN_DIR) + "/" + name; }
+
+SimulatedRobotOptions robot_options() {
+  SimulatedRobotOptions options;
+  options.convention = Convention::kuka;
+  options.frame = 3;
+  options.first_request_id = 1000;
+  return options;
+}
+
+}  // namespace
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "zeropose-test-XXXXXX").string();
+  if (!::mkdtemp(name.data())) throw std::runtime_error("cannot make " + name);
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
+
+WalkingLine::WalkingLine(std::filesystem::path cell)
+    : cell_(std::move(cell)), notify_(folder_ / "notify.sock"), robot_(robot_options()) {}
+
+void WalkingLine::start_cell() {
+  cell_process =
+      std::make_unique<Process>(std::vector<std::string>{program("zeropose-cell"), "--cell", cell_.string(),
+                                                         "--control", (folder_ / "cell.sock").string()},
+                                folder_ / "cell.log");
+  const auto deadline = std::chrono::steady_clock::now() + start_patience;
+  while (!std::filesystem::exists(folder_ / "cell.sock") && std::chrono::steady_clock::now() < deadline)
+    std::this_thread::sleep_for(20ms);
+  ask_cell({{"cmd", "truth"}});
+}
+
+void WalkingLine::start_daemon() {
+  daemon_process = std::make_unique<Process>(
+      std::vector<std::string>{program("zeroposed"), "--cell", cell_.string(), "--state", state().string(),
+                               "--socket", (folder_ / "zeropose.sock").string()},
+      folder_ / "daemon.log",
+      std::vector<std::string>{"NOTIFY_SOCKET=" + (folder_ / "notify.sock").string(),
+                               "WATCHDOG_USEC=2000000"});
+  if (!notify_.heard("READY=1", start_patience))
+    throw std::runtime_error("the daemon is not READY:\n" + daemon_log());
+}
+
+int WalkingLine::stop_daemon() {
+  daemon_process->signal(SIGTERM);
+  const int status = daemon_process->wait(20s).value_or(-1);
+  daemon_process.reset();
+  return status;
+}
+
+void WalkingLine::wait_until_alive() {
+  const Finished status = zeropose({"status", "--wait", "30"});
+  if (status.out.find("MISSING") != std::string::npos) throw std::runtime_error(status.out);
+}
+
+void WalkingLine::take_zero() {
+  wait_until_alive();
+  const Finished zero = zeropose({"zero"});
+  if (zero.status != 0) throw std::runtime_error("no zero: " + zero.out + zero.err);
+}
+
+Json WalkingLine::ask_cell(const Json& question) const {
+  const Json answer = Json::parse(ask(folder_ / "cell.sock", question.dump(), 30s));
+  if (answer.value("status", "") != "ok") throw std::runtime_error("the cell says " + answer.dump());
+  return answer;
+}
+
+Json WalkingLine::ask_daemon(const Json& question) const {
+  return Json::parse(ask(folder_ / "zeropose.sock", question.dump(), 30s));
+}
+
+void WalkingLine::shift(const Pose& X_WO) {
+  const SixNumbers s = to_six_numbers(X_WO);
+  ask_cell({{"cmd", "shift"}, {"pose", {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg}}});
+}
+
+Json WalkingLine::fault(const std::string& kind, const Json& more) {
+  Json question{{"cmd", "fault"}, {"kind", kind}};
+  question.update(more);
+  return ask_cell(question);
+}
+
+Finished WalkingLine::zeropose(std::vector<std::string> arguments) const {
+  arguments.insert(arguments.begin(), program("zeropose"));
+  arguments.insert(arguments.end(), {"--socket", (folder_ / "zeropose.sock").string()});
+  return run_program(arguments);
+}
+
+Pose WalkingLine::shift_from(const Pose& D_R) const {
+  const Pose X_WR =
+      from_six_numbers({1200, -2400, -150, 0, 0, 90});  // as in the cell file; X_WO0 is the identity
+  return X_WR * D_R * X_WR.inverse();
+}
+
+std::string WalkingLine::daemon_log() const {
+  std::stringstream text;
+  text << std::ifstream(folder_ / "daemon.log").rdbuf();
+  return text.str();
+}
+
+}  // namespace zeropose

@@ -1,0 +1,65 @@
+// The whole line for tests: simulated cell, daemon and a robot, as processes in a private network.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "sim/robot.h"
+#include "tests/support/process.h"
+
+namespace zeropose {
+
+// A folder that goes with its owner.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
+  const std::filesystem::path& path() const { return path_; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// Files live in `folder`: state/, control and notify sockets, logs. Programs come from ZEROPOSE_BIN_DIR.
+class WalkingLine {
+ public:
+  explicit WalkingLine(std::filesystem::path cell = std::filesystem::path(ZEROPOSE_SOURCE_DIR) /
+                                                    "config/cells/car-body.json");
+
+  void start_cell();
+  void start_daemon();      // and waits for READY=1
+  int stop_daemon();        // SIGTERM; its exit status, -1 when it does not end
+  void wait_until_alive();  // all cameras
+  void take_zero();         // by the command line
+  void shift(const Pose& X_WO);
+  nlohmann::json fault(const std::string& kind, const nlohmann::json& more = nlohmann::json::object());
+  nlohmann::json ask_cell(const nlohmann::json& question) const;
+  nlohmann::json ask_daemon(const nlohmann::json& question) const;
+  // The command line with --socket added for the verbs that need it.
+  Finished zeropose(std::vector<std::string> arguments) const;
+
+  SimulatedRobot& robot() { return robot_; }
+  // The robot-base shift that the robot was sent, as X_O0O.
+  Pose shift_from(const Pose& D_R) const;
+  const std::filesystem::path& cell_file() const { return cell_; }
+  std::filesystem::path state() const { return folder_ / "state"; }
+  NotifyListener& notify() { return notify_; }
+  std::string daemon_log() const;
+
+  // Both end with the object; public so that a test can kill them.
+  std::unique_ptr<Process> cell_process, daemon_process;
+
+ private:
+  TemporaryFolder folder_;
+  std::filesystem::path cell_;
+  NotifyListener notify_;
+  SimulatedRobot robot_;
+};
+
+}  // namespace zeropose
