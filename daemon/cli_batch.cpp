@@ -1,0 +1,369 @@
+#include "daemon/cli_batch.h"
+
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <sstream>
+
+#include "calib/best_fit.h"
+#include "config/cameras.h"
+#include "config/cell.h"
+#include "config/csv.h"
+#include "config/tables.h"
+#include "config/text.h"
+#include "daemon/cli_answer.h"
+#include "daemon/cli_help.h"
+#include "measure/pose.h"
+#include "protocol/conventions.h"
+
+namespace zeropose {
+namespace {
+
+using namespace cli;
+
+// --- check-config
+
+std::string summary_of(const Cell& cell) {
+  std::ostringstream text;
+  text << "OK: cell " << cell.name << (cell.simulated ? " (simulated)" : "") << "\n";
+  for (const CameraOptions& camera : cell.cameras)
+    text << "  camera " << camera.name << " at " << camera.address << ", " << camera.width_px << " x "
+         << camera.height_px << " px\n";
+  for (const Job& job : cell.jobs)
+    text << "  job " << job.number << " " << job.name << ": " << job.marks.size() << " marks, "
+         << job.views.size() << " views\n";
+  for (const RobotOptions& robot : cell.robots)
+    text << "  robot " << robot.name << ": " << name_of(robot.convention) << ", Modbus TCP " << robot.address
+         << ":" << robot.port << " unit " << int{robot.unit} << "\n";
+  text << "  hashes: config " << hash_text(cell.config_hash) << ", calibration "
+       << hash_text(cell.calibration_hash) << "\n";
+  return text.str();
+}
+
+Answer check_config(const std::string& file) {
+  const Cell cell = load_cell(file);
+  std::size_t marks = 0;
+  for (const Job& job : cell.jobs) marks += job.marks.size();
+  Answer answer;
+  answer.text = summary_of(cell);
+  answer.json = {{"status", "ok"},
+                 {"reason", ""},
+                 {"cell", cell.name},
+                 {"simulated", cell.simulated},
+                 {"cameras", cell.cameras.size()},
+                 {"jobs", cell.jobs.size()},
+                 {"marks", marks},
+                 {"robots", cell.robots.size()},
+                 {"config_hash", hash_text(cell.config_hash)},
+                 {"calibration_hash", hash_text(cell.calibration_hash)}};
+  return answer;
+}
+
+void add_check_config(CLI::App& app, int& exit_status) {
+  struct Options {
+    std::string file;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("check-config", "Checks a cell file and the calibration file that it names");
+  verb->add_option("CELL", options->file, "the cell file (JSON, comments allowed)")->required();
+  verb->add_flag("--json", options->json,
+                 "one JSON object on stdout: status, reason, mistakes, counts, hashes");
+  verb->footer(check_config_help);
+  verb->callback([options, &exit_status] {
+    exit_status = run([&] { return check_config(options->file); }, options->json);
+  });
+}
+
+// --- bestfit
+
+std::string reason_of(BestFitStatus status) {
+  switch (status) {
+    case BestFitStatus::too_few_points:
+      return "fewer than three points with a weight above 0";
+    case BestFitStatus::collinear:
+      return "the points lie on a line: the rotation about it is free";
+    case BestFitStatus::not_finite:
+      return "a number that is not finite";
+    default:
+      return "no best fit found";
+  }
+}
+
+Answer best_fit_of(const std::string& file) {
+  const std::vector<PointPair> pairs = load_point_pairs(file);
+  const BestFitResult result = best_fit(pairs);
+  if (result.status != BestFitStatus::ok) return failure(reason_of(result.status));
+  Answer answer;
+  std::string residuals;
+  Json residuals_json = Json::array();
+  for (const Eigen::Vector3d& residual : result.residuals_mm) {
+    residuals += table_of({residual.data(), 3}) + "\n";
+    residuals_json.push_back(json_of(residual));
+  }
+  const std::array<double, 6> six = six_of(result.X_AB);
+  answer.json = {{"status", "ok"},
+                 {"reason", ""},
+                 {"X_AB", six},
+                 {"residuals", residuals_json},
+                 {"rms_mm", result.rms_mm}};
+  answer.text = "X_AB, mm and degrees:\n" + table_of(six) + "\nresiduals p_A - X_AB p_B, mm:\n" + residuals +
+                "rms, mm:" + table_of({&result.rms_mm, 1}) + "\n";
+  return answer;
+}
+
+void add_bestfit(CLI::App& app, int& exit_status) {
+  struct Options {
+    std::string points;
+    bool json = false;
+  };
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      app.add_subcommand("bestfit", "The rigid pose between two frames from points known in both");
+  verb->add_option("--points", options->points, "CSV with the columns xa ya za xb yb zb [weight], mm")
+      ->required();
+  verb->add_flag("--json", options->json,
+                 "one JSON object on stdout: status, reason, X_AB [x, y, z, rx, ry, rz], residuals, rms_mm");
+  verb->footer(bestfit_help);
+  verb->callback([options, &exit_status] {
+    exit_status = run([&] { return best_fit_of(options->points); }, options->json);
+  });
+}
+
+// --- convert pose
+
+Convention convention_of(const std::string& name) {
+  if (name == "zeropose") return Convention::generic;
+  if (const auto convention = convention_named(name)) return *convention;
+  std::string all = "zeropose";
+  for (const Convention convention : all_conventions()) all += ", " + std::string(name_of(convention));
+  throw std::invalid_argument(concat({"found the convention ", in_quotes(name), ", expected one of ", all}));
+}
+
+struct Conversion {
+  std::string place;
+  std::vector<double> from, to;
+  std::optional<Pose> X_AB;  // nullopt: the numbers are no pose
+};
+
+Conversion convert(Convention from, Convention to, const std::string& text, const std::string& place) {
+  Conversion conversion{place, parse_numbers(text, place), {}, {}};
+  const std::size_t count = to_maker(from, Pose::Identity()).size();
+  if (conversion.from.size() != count)
+    throw std::invalid_argument(
+        concat({place, ": found ", std::to_string(conversion.from.size()), " numbers, expected the ",
+                std::to_string(count), " of ", name_of(from)}));
+  conversion.X_AB = from_maker(from, conversion.from);
+  if (conversion.X_AB) conversion.to = to_maker(to, *conversion.X_AB);
+  return conversion;
+}
+
+// One pose per line; blank lines and lines that begin with # are left out.
+std::vector<Conversion> convert_lines(Convention from, Convention to, std::istream& lines) {
+  std::vector<Conversion> conversions;
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    const std::size_t first = line.find_first_not_of(" \t\r");
+    if (first == std::string::npos || line[first] == '#') continue;
+    if (line.back() == '\r') line.pop_back();
+    conversions.push_back(convert(from, to, line, "stdin:" + std::to_string(number)));
+  }
+  return conversions;
+}
+
+std::string exact_text(std::span<const double> numbers) {
+  std::ostringstream text;
+  for (std::size_t i = 0; i < numbers.size(); ++i)
+    text << (i > 0 ? " " : "") << std::setprecision(12) << numbers[i];
+  return text.str();
+}
+
+struct ConvertOptions {
+  std::string from, to;
+  std::vector<std::string> values;
+  bool json = false;
+};
+
+Answer convert_pose(const ConvertOptions& options) {
+  const Convention from = convention_of(options.from), to = convention_of(options.to);
+  std::string given;
+  for (const std::string& value : options.values) given += value + " ";
+  const std::vector<Conversion> conversions = options.values.empty()
+                                                  ? convert_lines(from, to, std::cin)
+                                                  : std::vector{convert(from, to, given, "values")};
+  Answer answer;
+  answer.json = {{"status", "ok"},
+                 {"reason", ""},
+                 {"from", name_of(from)},
+                 {"to", name_of(to)},
+                 {"fields", field_names(to)}};
+  Json poses = Json::array();
+  for (const Conversion& conversion : conversions) {
+    if (!conversion.X_AB)
+      return failure(conversion.place +
+                     ": the rotation is none (a quaternion must have length 1, a matrix must be "
+                     "orthonormal with a last row 0 0 0 1)");
+    poses.push_back({{"values", conversion.to}, {"X_AB", six_of(*conversion.X_AB)}});
+    answer.text += exact_text(conversion.to) + "\n";
+  }
+  if (options.values.empty())
+    answer.json["poses"] = poses;
+  else
+    answer.json.update(poses.front());
+  return answer;
+}
+
+void add_convert(CLI::App& app, int& exit_status) {
+  auto options = std::make_shared<ConvertOptions>();
+  CLI::App* convert_verb =
+      app.add_subcommand("convert", "Converts poses between the conventions of robot makers");
+  convert_verb->require_subcommand(1);
+  CLI::App* verb =
+      convert_verb->add_subcommand("pose", "Converts a pose from one maker's numbers to another's");
+  verb->add_option("--from", options->from, "the convention of the values")->required();
+  verb->add_option("--to", options->to, "the convention wanted")->required();
+  verb->add_option("VALUES", options->values, "6 numbers (abb: 7, matrix: 16), parted by blanks or commas");
+  verb->add_flag("--json", options->json, "one JSON object on stdout: status, reason, values, fields, X_AB");
+  verb->footer(convert_pose_help);
+  verb->callback(
+      [options, &exit_status] { exit_status = run([&] { return convert_pose(*options); }, options->json); });
+}
+
+// --- pose
+
+struct PoseOptions {
+  std::string cameras, marks, observations;
+  std::optional<std::string> start, planar;
+  double system_sigma_px = 0;
+  std::string residual = "reprojection";
+  bool json = false;
+};
+
+std::optional<Pose> pose_of(const std::optional<std::string>& text, const std::string& option) {
+  if (!text) return std::nullopt;
+  return convert(Convention::generic, Convention::generic, *text, option).X_AB;
+}
+
+Json name_json(const PoseInput& input, const Observation& observation) {
+  return {{"camera", input.cameras[observation.camera].name}, {"mark", input.marks[observation.mark].name}};
+}
+
+Json deviation_json(const PoseInput& input, std::size_t index, const Deviation& deviation) {
+  const Observation& observation = input.observations[index];
+  Json json = name_json(input, observation);
+  json["u_px"] = observation.u_px.x();
+  json["v_px"] = observation.u_px.y();
+  json["dev_px"] = json_of(deviation.dev_px);
+  json["dev_mm"] = json_of(deviation.dev_mm);
+  json["normalised"] = deviation.normalised;
+  json["used"] = deviation.used;
+  json["removed"] = deviation.removed;
+  return json;
+}
+
+Json pose_json(const PoseInput& input, const PoseResult& result) {
+  const bool good = result.code == Code::ok;
+  Json json = {{"status", good ? "ok" : "failed"},
+               {"reason", result.reason},
+               {"code", static_cast<int>(result.code)},
+               {"name", text_of(result.code).name}};
+  // No number that could be taken for a pose unless it is one.
+  json["X_WO"] = good ? Json(six_of(result.X_WO)) : Json();
+  json["covariance"] = Json();
+  if (good)
+    for (int row = 0; row < 6; ++row)
+      json["covariance"].push_back(json_of(Vector6(result.covariance.row(row))));
+  json["deviations"] = Json::array();
+  for (std::size_t i = 0; i < result.deviations.size(); ++i)
+    json["deviations"].push_back(deviation_json(input, i, result.deviations[i]));
+  json["removed"] = Json::array();
+  for (const std::size_t index : result.removed)
+    json["removed"].push_back(name_json(input, input.observations[index]));
+  json["effective_marks"] = result.effective_marks;
+  json["effective_cameras"] = result.effective_cameras;
+  json["redundancy"] = result.redundancy;
+  return json;
+}
+
+std::string pose_text(const PoseInput& input, const PoseResult& result) {
+  if (result.code != Code::ok)
+    return concat({"no answer: code ", std::to_string(static_cast<int>(result.code)), " ",
+                   text_of(result.code).name, ": ", result.reason, "\n"});
+  Vector6 sigma = result.covariance.diagonal().cwiseSqrt();
+  sigma.tail<3>() *= degrees_per_radian;
+  std::ostringstream text;
+  text << "X_WO, mm and degrees:\n"
+       << table_of(six_of(result.X_WO)) << "\nsigma along and about the world's axes:\n"
+       << table_of({sigma.data(), 6}) << "\n"
+       << result.effective_marks << " marks in " << result.effective_cameras << " cameras, redundancy "
+       << result.redundancy << "\ndeviations, px and mm:\n";
+  for (std::size_t i = 0; i < result.deviations.size(); ++i) {
+    const Deviation& deviation = result.deviations[i];
+    text << table_of({deviation.dev_px.data(), 2}) << table_of({deviation.dev_mm.data(), 2}) << "  "
+         << input.cameras[input.observations[i].camera].name << " "
+         << input.marks[input.observations[i].mark].name
+         << (deviation.removed ? "  removed as wrong"
+             : deviation.used  ? ""
+                               : "  not used")
+         << "\n";
+  }
+  return text.str();
+}
+
+Answer estimate(const PoseOptions& options) {
+  PoseProblem problem;
+  problem.X_WO_start = pose_of(options.start, "--start");
+  problem.X_WP_planar = pose_of(options.planar, "--planar");
+  problem.system_sigma_px = options.system_sigma_px;
+  problem.residual = options.residual == "algebraic" ? Residual::algebraic : Residual::reprojection;
+  const PoseInput input = load_pose_input(options.cameras, options.marks, options.observations);
+  problem.cameras = input.cameras;
+  problem.marks = input.marks;
+  problem.observations = input.observations;
+  const PoseResult result = estimate_pose(problem);
+  return {result.code == Code::ok ? done : no_answer, pose_json(input, result), pose_text(input, result)};
+}
+
+void add_pose_options(CLI::App& verb, PoseOptions& options) {
+  verb.add_option("--cameras", options.cameras, "JSON {\"name\": camera, ...} with model, internals and X_WC")
+      ->required();
+  verb.add_option("--marks", options.marks,
+                  "CSV: mark x_mm y_mm z_mm [weight tolerance_px tolerance_mm sigma_mm]")
+      ->required();
+  verb.add_option("--observations", options.observations, "CSV: camera mark u_px v_px [suu svv suv]")
+      ->required();
+  verb.add_option("--start", options.start, "x,y,z,rx,ry,rz to start from; without it from any pose");
+  verb.add_option("--planar", options.planar,
+                  "x,y,z,rx,ry,rz of a plane in the world: only x, y, rz in it are free, 2 marks suffice");
+  verb.add_option("--system-sigma-px", options.system_sigma_px, "calibration errors that remain, in px (0)")
+      ->check(CLI::Range(0.0, 100.0));
+  verb.add_option("--residual", options.residual, "what is minimised (reprojection)")
+      ->check(CLI::IsMember({"reprojection", "algebraic"}));
+  verb.add_flag(
+      "--json", options.json,
+      "one JSON object on stdout: status, reason, code, X_WO [x, y, z, rx, ry, rz], covariance (6x6, mm and\n"
+      "rad), deviations, removed, effective_marks, effective_cameras, redundancy");
+}
+
+void add_pose(CLI::App& app, int& exit_status) {
+  auto options = std::make_shared<PoseOptions>();
+  CLI::App* verb =
+      app.add_subcommand("pose", "The pose of an object from marks found in any number of cameras");
+  add_pose_options(*verb, *options);
+  verb->footer(pose_help);
+  verb->callback(
+      [options, &exit_status] { exit_status = run([&] { return estimate(*options); }, options->json); });
+}
+
+}  // namespace
+
+void add_batch_verbs(CLI::App& app, int& exit_status) {
+  add_check_config(app, exit_status);
+  add_pose(app, exit_status);
+  add_bestfit(app, exit_status);
+  add_convert(app, exit_status);
+}
+
+}  // namespace zeropose

@@ -1,0 +1,12 @@
+// The verbs that need no running daemon: check-config, pose, bestfit, convert pose (spec 92).
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace zeropose {
+
+// Adds the verbs; the one that is called sets exit_status: 0 done, 1 the input cannot give an answer, 2 wrong
+// usage or unreadable input. With --json exactly one object goes to stdout; messages always go to stderr.
+void add_batch_verbs(CLI::App& app, int& exit_status);
+
+}  // namespace zeropose

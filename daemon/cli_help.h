@@ -1,0 +1,52 @@
+// What --help of the batch verbs says below the options.
+#pragma once
+
+namespace zeropose::cli {
+
+inline constexpr const char* check_config_help =
+    R"(Prints a summary, or every mistake at once, each with file, line or key path, what was found and what is
+expected.
+Example:
+  zeropose check-config config/cells/car-body.json
+Exit status: 0 all is well, 2 mistakes or an unreadable file.)";
+
+inline constexpr const char* bestfit_help =
+    R"(X_AB carries points given in frame B onto the same points given in frame A with the least weighted sum of
+squared distances. Needs three points that are not on a line.
+Example: points.csv
+  xa, ya, za, xb, yb, zb
+  0, 0, 0, 10, 0, 0
+  100, 0, 0, 10, 100, 0
+  0, 50, 0, -40, 0, 0
+  zeropose bestfit --points points.csv
+Exit status: 0 done, 1 too few or collinear points, 2 wrong usage or unreadable input.)";
+
+inline constexpr const char* convert_pose_help =
+    R"(Each maker's numbers are in its order and units: mm and degrees; universal-robots m and a rotation vector in
+rad; abb mm and a quaternion w x y z; matrix 16 numbers row by row, mm. Conventions: zeropose (the same as
+generic: x y z rx ry rz with R = Rz Ry Rx), kuka, fanuc, yaskawa, mitsubishi, epson, kawasaki, comau, staubli,
+abb, universal-robots, denso, techman, adept, doosan, matrix.
+Without VALUES one pose per line is read from stdin; lines that begin with # are comments.
+Write -0.5, not -.5, or put -- in front of the values.
+Examples:
+  zeropose convert pose --from kuka --to abb 100 200 -300 90 0 10
+  zeropose convert pose --from zeropose --to fanuc --json < poses.csv
+Exit status: 0 done, 1 the numbers are no rotation, 2 wrong usage or unreadable input.)";
+
+inline constexpr const char* pose_help =
+    R"(Marks that do not fit the others are removed and named; when the redundancy does not tell which one is wrong,
+there is no answer. suu svv suv is the covariance of the found pixel in px^2. Where it is not given it is that
+of one pixel (1 1 0): without wrong marks the pose is the same, but its covariance and the test for wrong
+marks then speak of one pixel. The covariance of the pose is along and about the world's axes, about the
+object's origin.
+Example:
+  zeropose pose --cameras cameras.json --marks marks.csv --observations found.csv --json
+with cameras.json
+  {"left": {"model": "division", "width": 768, "height": 572, "fx": 4235, "fy": 4228, "cx": 416, "cy": 333,
+            "K": -0.01, "X_WC": [-1884, -3063, -939, -69.2, -3, -35.4]}, ...}
+marks.csv                     found.csv
+  mark, x_mm, y_mm, z_mm        camera, mark, u_px, v_px
+  hole, -525.6, -751.9, 200.9   left, hole, 401.25, 288.5
+Exit status: 0 done, 1 no answer (status, code and reason say why), 2 wrong usage or unreadable input.)";
+
+}  // namespace zeropose::cli
