@@ -28,14 +28,39 @@ struct CameraOptions {
   std::string name;     // as in the cell
   std::string address;  // IPv4 address of a GigE Vision camera
   int width_px = 0, height_px = 0;
-  std::optional<double> exposure_us, gain;
+  std::optional<double> exposure_us = {}, gain = {};
 };
+
+// What a device did wrong. Missing: it cannot be reached, or no longer; open it anew. In use: by another
+// program, or by one that died less than a heartbeat (3 s) ago. After the others it goes on, the frame is
+// lost.
+enum class DeviceFault { missing, in_use, damaged_frame, wrong_size };
 
 // A device that failed: which, what happened, what to do.
 class DeviceError : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit DeviceError(const std::string& what, DeviceFault fault = DeviceFault::missing)
+      : std::runtime_error(what), fault_(fault) {}
+  DeviceFault fault() const { return fault_; }
+
+ private:
+  DeviceFault fault_;
 };
+
+// Counted since the device was opened. Every frame that is not handed out is counted somewhere.
+struct CameraStatistics {
+  std::uint64_t frames = 0;           // handed out
+  std::uint64_t timeouts = 0;         // deadlines without a frame
+  std::uint64_t damaged = 0;          // frames that came incomplete or out of sequence
+  std::uint64_t wrong_size = 0;       // frames of another size or pixel format
+  std::uint64_t stale = 0;            // frames that answered no trigger, or one too old
+  std::uint64_t renewals = 0;         // streams thrown away because a frame could have been stale
+  std::uint64_t failures = 0;         // by the library: frames not completed
+  std::uint64_t underruns = 0;        // by the library: no buffer was free
+  std::uint64_t resent_packets = 0;   // by the library
+  std::uint64_t missing_packets = 0;  // by the library
+};
+CameraStatistics operator+(const CameraStatistics& a, const CameraStatistics& b);
 
 // One thread per camera: no call may be made from two threads, and each may block while a device is being
 // lost.
@@ -50,6 +75,10 @@ class Camera {
   // the frame came damaged or the device is lost.
   virtual std::optional<Frame> grab(TimePoint deadline) = 0;
   virtual void stop() noexcept = 0;
+  // A sign of life, for the time between requests; also puts right what a failed grab left behind. Throws
+  // DeviceError when the device is gone.
+  virtual void check() {}
+  virtual CameraStatistics statistics() const { return {}; }
 };
 
 std::unique_ptr<Camera> open_camera(
