@@ -178,9 +178,16 @@ void fill_deviations(const PoseModel& model, const Estimate& estimate, PoseResul
 
 // The covariance about M as one about O: dp_O = dp_M + [c]x dr with c from O to M, axes of W.
 Matrix6 about_origin(const PoseModel& model, const CentredPose& pose, const Matrix6& covariance) {
-  Matrix6 T = Matrix6::Identity();
-  T.topRightCorner<3, 3>() = cross_matrix(pose.R_WO * model.centroid_O_mm());
-  return T * covariance * T.transpose();
+  const Eigen::Matrix3d S = cross_matrix(pose.R_WO * model.centroid_O_mm());
+  const Eigen::Matrix3d turn = covariance.bottomRightCorner<3, 3>();
+  const Eigen::Matrix3d mixed = covariance.topRightCorner<3, 3>() + S * turn;
+  Matrix6 about_O;
+  about_O.topLeftCorner<3, 3>() =
+      covariance.topLeftCorner<3, 3>() + S * covariance.bottomLeftCorner<3, 3>() + mixed * S.transpose();
+  about_O.topRightCorner<3, 3>() = mixed;
+  about_O.bottomLeftCorner<3, 3>() = mixed.transpose();
+  about_O.bottomRightCorner<3, 3>() = turn;
+  return about_O;
 }
 
 void fill_result(const PoseModel& model, const PoseProblem& problem, const Estimate& estimate,

@@ -18,6 +18,20 @@ CentredPose moved(const CentredPose& pose, const Vector6& delta) {
   return {exp_so3(delta.tail<3>()) * pose.R_WO, pose.p_WM_mm + delta.head<3>()};
 }
 
+namespace {
+
+// W with W' W = P.
+Matrix2d whitening_of(const Matrix2d& P) {
+  Matrix2d W = Matrix2d::Zero();
+  if (!(P(0, 0) > 0)) return W;
+  W(0, 0) = std::sqrt(P(0, 0));
+  W(0, 1) = P(0, 1) / W(0, 0);
+  W(1, 1) = std::sqrt(std::max(0.0, P(1, 1) - W(0, 1) * W(0, 1)));
+  return W;
+}
+
+}  // namespace
+
 Eigen::Matrix<double, 2, 6> Sight::J() const {
   Eigen::Matrix<double, 2, 6> J;
   J << A, -A * cross_matrix(q);
@@ -66,6 +80,7 @@ PoseModel::PoseModel(const PoseProblem& problem)
     sight.information = residual_ == Residual::reprojection
                             ? Matrix2d(square * observation.covariance_px2.inverse())
                             : Matrix2d(square * Matrix2d::Identity());
+    sight.whitening = whitening_of(sight.information);
     sight.has_offset = mark.radius_mm > 0 && !mark.normal_O.isZero();
     sight.active = mark.weight > 0;
     if (!sight.active) continue;
@@ -137,21 +152,26 @@ bool PoseModel::linearise_algebraic(const Vector3d& p_C_mm, Sight& sight) const 
   return true;
 }
 
-bool PoseModel::linearise(const CentredPose& pose, NormalEquations& equations, bool all) {
+bool PoseModel::linearise(const CentredPose& pose, NormalEquations& equations) {
   equations = {};
   for (Sight& sight : sights_) {
-    if (!sight.active && !all) continue;
-    sight.visible = linearise(pose, sight);
     if (!sight.active) continue;
+    sight.visible = linearise(pose, sight);
     if (!sight.visible) return false;
-    const Matrix23 PA = sight.information * sight.A;
-    const Vector3d h = PA.transpose() * sight.r;
-    add_normal_matrix(sight.A.transpose() * PA, sight.q, equations.N);
-    equations.g.head<3>() += h;
-    equations.g.tail<3>() += sight.q.cross(h);
-    equations.cost += sight.r.dot(sight.information * sight.r);
+    const Matrix23 WA = sight.whitening * sight.A;
+    const Vector2d Wr = sight.whitening * sight.r;
+    Eigen::Matrix<double, 6, 2> J;  // transposed
+    J << WA.transpose(), sight.q.cross(WA.row(0).transpose()), sight.q.cross(WA.row(1).transpose());
+    equations.N.noalias() += J * J.transpose();
+    equations.g.noalias() += J * Wr;
+    equations.cost += Wr.squaredNorm();
   }
   return true;
+}
+
+void PoseModel::linearise_unused(const CentredPose& pose) {
+  for (Sight& sight : sights_)
+    if (!sight.active) sight.visible = linearise(pose, sight);
 }
 
 Matrix2d PoseModel::own_covariance(const Sight& sight) const {

@@ -39,6 +39,7 @@ struct Sight {
   Eigen::Vector2d u_px;
   Eigen::Matrix2d covariance_px2;
   Eigen::Matrix2d information;  // P
+  Eigen::Matrix2d whitening;    // W with W' W = P
   bool has_offset = false;      // radius and normal are known
   bool active = false;          // takes part in the estimate
   bool visible = false;         // has an image at the pose of the linearisation
@@ -78,9 +79,10 @@ class PoseModel {
   // The eccentricity of each disc's image at this pose. It changes so slowly that it is held during the last
   // steps.
   void refresh_offsets(const CentredPose& pose);
-  // Linearises the active observations, or all, and adds up the active ones. False when an active mark has no
-  // image.
-  bool linearise(const CentredPose& pose, NormalEquations& equations, bool all = false);
+  // Linearises the active observations and adds them up. False when one of them has no image.
+  bool linearise(const CentredPose& pose, NormalEquations& equations);
+  // Linearises those that are not active, for their deviations.
+  void linearise_unused(const CentredPose& pose);
 
   // Covariance of an observation's residual noise at the last linearisation: the mark's own, the system's and
   // that of non-rigidity, in the units of r.

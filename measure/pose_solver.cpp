@@ -1,16 +1,18 @@
 #include "measure/pose_solver.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+
+#include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
 
-// A step below this (mm at the extent of the marks) is the last one: the next would be a thousand times
-// smaller.
-constexpr double last_step_mm = 1e-6;
+// A step below this (mm at the extent of the marks) is the last one, if the step after it, as the last two
+// predict it, is below the second: what was linearised before it still holds.
+constexpr double last_step_mm = 1e-5, next_step_mm = 1e-7;
 // A step above this changes the eccentricity of the discs' images noticeably (about 1e-7 px per 0.01 mm).
 constexpr double offset_step_mm = 1e-2;
 constexpr int max_rounds = 100;
@@ -35,13 +37,13 @@ bool solve_step(const PoseModel& model, const NormalEquations& equations, double
     const auto& basis = model.planar_basis();
     Eigen::Matrix3d N3 = basis.transpose() * N * basis;
     N3.diagonal() *= 1 + damping;
-    const Eigen::LLT<Eigen::Matrix3d> cholesky(N3);
-    if (cholesky.info() != Eigen::Success) return false;
+    const SmallCholesky<3> cholesky(N3);
+    if (!cholesky.ok()) return false;
     delta = scale.cwiseProduct(basis * cholesky.solve(basis.transpose() * g));
   } else {
     N.diagonal() *= 1 + damping;
-    const Eigen::LLT<Matrix6> cholesky(N);
-    if (cholesky.info() != Eigen::Success) return false;
+    const SmallCholesky<6> cholesky(N);
+    if (!cholesky.ok()) return false;
     delta = scale.cwiseProduct(cholesky.solve(g));
   }
   return delta.allFinite();
@@ -51,51 +53,68 @@ double length_mm(const PoseModel& model, const Vector6& delta) {
   return delta.head<3>().norm() + model.extent_mm() * delta.tail<3>().norm();
 }
 
-double raised(double damping) { return std::max(10 * damping, 1e-4); }
 
-// One round of Levenberg-Marquardt: a step that lowers the cost, or more damping.
-struct Round {
-  bool accepted = false;
-  double step_mm = 0;
+// Levenberg-Marquardt from a pose the model is linearised at.
+class Descent {
+ public:
+  Descent(PoseModel& model, Solution& solution) : model_(model), solution_(solution) {}
+
+  SolverStatus run() {
+    for (int round = 0; round < max_rounds; ++round) {
+      Vector6 delta;
+      if (!solve_step(model_, solution_.equations, damping_, delta)) {
+        if (!damp()) return SolverStatus::not_converged;
+        continue;
+      }
+      const double step_mm = length_mm(model_, delta);
+      if (is_last(step_mm)) {
+        solution_.pose = moved(solution_.pose, delta);
+        return SolverStatus::converged;
+      }
+      if (take(delta, step_mm)) {
+        previous_step_mm_ = step_mm;
+        damping_ = damping_ < 1e-3 ? 0 : damping_ / 10;
+      } else if (!damp()) {
+        return SolverStatus::not_converged;
+      }
+    }
+    return SolverStatus::not_converged;
+  }
+
+  bool model_is_elsewhere() const { return rejected_; }
+
+ private:
+  bool is_last(double step_mm) const {
+    return step_mm < last_step_mm && step_mm * std::min(1.0, step_mm / previous_step_mm_) < next_step_mm;
+  }
+
+  // Goes there if the cost gets lower.
+  bool take(const Vector6& delta, double step_mm) {
+    const CentredPose next = moved(solution_.pose, delta);
+    if (step_mm > offset_step_mm) model_.refresh_offsets(next);
+    NormalEquations equations;
+    rejected_ = !model_.linearise(next, equations) ||
+                !(equations.cost <= solution_.equations.cost * (1 + 1e-9) + 1e-12);
+    if (rejected_) {
+      if (step_mm > offset_step_mm) model_.refresh_offsets(solution_.pose);
+      return false;
+    }
+    solution_.pose = next;
+    solution_.equations = equations;
+    return true;
+  }
+
+  bool damp() {
+    damping_ = std::max(10 * damping_, 1e-4);
+    return damping_ <= 1e12;
+  }
+
+  PoseModel& model_;
+  Solution& solution_;
+  double damping_ = 0;
+  double previous_step_mm_ = std::numeric_limits<double>::infinity();
+  bool rejected_ = false;  // the last linearisation was not taken
 };
-
-Round try_step(PoseModel& model, Solution& solution, double damping) {
-  Vector6 delta;
-  if (!solve_step(model, solution.equations, damping, delta)) return {};
-  const double step_mm = length_mm(model, delta);
-  const CentredPose next = moved(solution.pose, delta);
-  if (step_mm < last_step_mm) {
-    solution.pose = next;
-    return {true, step_mm};
-  }
-  NormalEquations equations;
-  const bool accepted =
-      model.linearise(next, equations) && equations.cost <= solution.equations.cost * (1 + 1e-9) + 1e-12;
-  if (accepted) {
-    solution.pose = next;
-    solution.equations = equations;
-  }
-  return {accepted, step_mm};
-}
-
-SolverStatus iterate(PoseModel& model, Solution& solution) {
-  double damping = 0;
-  for (int round = 0; round < max_rounds; ++round) {
-    const Round done = try_step(model, solution, damping);
-    if (done.accepted && done.step_mm < last_step_mm) return SolverStatus::converged;
-    if (!done.accepted) {
-      damping = raised(damping);
-      if (damping > 1e12) return SolverStatus::not_converged;
-      continue;
-    }
-    damping = damping < 1e-3 ? 0 : damping / 10;
-    if (done.step_mm > offset_step_mm) {
-      model.refresh_offsets(solution.pose);
-      if (!model.linearise(solution.pose, solution.equations)) return SolverStatus::no_image;
-    }
-  }
-  return SolverStatus::not_converged;
-}
 
 Matrix6 unscaled(const Matrix6& M, const Vector6& scale) {
   return scale.asDiagonal() * M * scale.asDiagonal();
@@ -112,15 +131,15 @@ bool invert(const PoseModel& model, const Matrix6& N, Matrix6& inverse, double& 
   if (model.planar()) {
     const auto& basis = model.planar_basis();
     const Eigen::Matrix3d N3 = basis.transpose() * N * basis;
-    const Eigen::LLT<Eigen::Matrix3d> cholesky(N3);
-    if (cholesky.info() != Eigen::Success) return false;
-    const Eigen::Matrix3d inverse3 = cholesky.solve(Eigen::Matrix3d::Identity());
+    const SmallCholesky<3> cholesky(N3);
+    if (!cholesky.ok()) return false;
+    const Eigen::Matrix3d inverse3 = cholesky.inverse();
     condition = condition_of(N3, inverse3);
     inverse = basis * inverse3 * basis.transpose();
   } else {
-    const Eigen::LLT<Matrix6> cholesky(N);
-    if (cholesky.info() != Eigen::Success) return false;
-    inverse = cholesky.solve(Matrix6::Identity());
+    const SmallCholesky<6> cholesky(N);
+    if (!cholesky.ok()) return false;
+    inverse = cholesky.inverse();
     condition = condition_of(N, inverse);
   }
   return inverse.allFinite() && condition < max_condition;
@@ -152,10 +171,12 @@ Solution refine(PoseModel& model, const CentredPose& start) {
   Solution solution;
   solution.pose = start;
   model.refresh_offsets(start);
-  solution.status =
-      model.linearise(start, solution.equations) ? iterate(model, solution) : SolverStatus::no_image;
-  NormalEquations at_solution;
-  if (model.linearise(solution.pose, at_solution, true)) solution.equations = at_solution;
+  solution.status = SolverStatus::no_image;
+  if (!model.linearise(start, solution.equations)) return solution;
+  Descent descent(model, solution);
+  solution.status = descent.run();
+  if (descent.model_is_elsewhere()) model.linearise(solution.pose, solution.equations);
+  model.linearise_unused(solution.pose);
   return solution;
 }
 
