@@ -203,7 +203,7 @@ Answer convert_pose(const ConvertOptions& options) {
   for (const Conversion& conversion : conversions) {
     if (!conversion.X_AB)
       return failure(conversion.place +
-                     ": the rotation is none (a quaternion must have length 1, a matrix must be "
+                     ": the numbers are no rotation (a quaternion must have length 1, a matrix must be "
                      "orthonormal with a last row 0 0 0 1)");
     poses.push_back({{"values", conversion.to}, {"X_AB", six_of(*conversion.X_AB)}});
     answer.text += exact_text(conversion.to) + "\n";

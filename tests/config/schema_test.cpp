@@ -1,0 +1,125 @@
+// config/cell.schema.json says the same as the loader.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <functional>
+
+#include "example_cell.h"
+#include "protocol/conventions.h"
+
+namespace zeropose {
+namespace {
+
+using testing::IsEmpty;
+
+Json schema() { return parsed(read_file(ZEROPOSE_SOURCE_DIR "/config/cell.schema.json")); }
+
+// Visits every property: its path with indices as [], its pointer into the example, its schema, and whether
+// it is required.
+using Visit =
+    std::function<void(const std::string& path, const std::string& pointer, const Json& property, bool)>;
+
+void walk(const Json& object, const std::string& path, const std::string& pointer, const Visit& visit) {
+  for (const auto& [key, property] : object["properties"].items()) {
+    const std::string key_path = path + (path.empty() ? "" : ".") + key;
+    const std::string key_pointer = pointer + "/" + key;
+    const auto& required = object["required"];
+    visit(key_path, key_pointer, property,
+          std::find(required.begin(), required.end(), key) != required.end());
+    if (property.contains("properties")) walk(property, key_path, key_pointer, visit);
+    if (property.contains("items") && property["items"].contains("properties"))
+      walk(property["items"], key_path + "[]", key_pointer + "/0", visit);
+  }
+}
+
+// The example with every optional key present.
+Json full_example() {
+  Json json = example();
+  json["$schema"] = "../cell.schema.json";
+  json["cameras"][0]["exposure_us"] = 2000;
+  json["cameras"][0]["gain"] = 1.5;
+  json["jobs"][0]["marks"][0]["tolerance_mm"] = 2;
+  json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
+  json["robots"][0]["require_command_crc"] = false;
+  json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
+  json["robots"][0]["allowed_readers"] = {"10.0.0.2"};
+  return json;
+}
+
+TEST(Schema, KnowsExactlyTheLoadersKeys) {
+  std::set<std::string> keys;
+  walk(schema(), "", "", [&](const std::string& path, auto&&...) { keys.insert(path); });
+  EXPECT_EQ(keys, known_cell_keys());
+  EXPECT_GT(keys.size(), 50U);
+}
+
+TEST(Schema, DescribesEveryKeyAndAllowsNoOther) {
+  const auto strict = [](const std::string& path, const std::string&, const Json& property, bool) {
+    EXPECT_TRUE(property.contains("description")) << path;
+    for (const Json* object : {&property, property.contains("items") ? &property["items"] : &property})
+      if (object->contains("properties")) {
+        EXPECT_EQ((*object)["additionalProperties"], false) << path;
+      }
+  };
+  EXPECT_EQ(schema()["additionalProperties"], false);
+  walk(schema(), "", "", strict);
+}
+
+TEST(Schema, RequiresWhatTheLoaderRequires) {
+  const Json full = full_example();
+  ASSERT_THAT(mistakes_in(full), IsEmpty());
+  walk(schema(), "", "",
+       [&](const std::string& path, const std::string& pointer, const Json&, bool required) {
+         const Json::json_pointer place(pointer);
+         ASSERT_TRUE(full.contains(place)) << path;
+         Json without = full;
+         without[place.parent_pointer()].erase(place.back());
+         const std::vector<std::string> mistakes = mistakes_in(without);
+         const bool refused = std::any_of(mistakes.begin(), mistakes.end(), [](const std::string& mistake) {
+           return mistake.find("found no such key") != std::string::npos;
+         });
+         EXPECT_EQ(refused, required) << path;
+       });
+}
+
+// True when the loader finds fault with the value itself (not with how it fits to others).
+bool refuses(const std::string& pointer, const Json& value) {
+  Json json = full_example();
+  json[Json::json_pointer(pointer)] = value;
+  for (const std::string& mistake : mistakes_in(json))
+    if (mistake.find("expected a number") != std::string::npos ||
+        mistake.find("expected an integer") != std::string::npos)
+      return true;
+  return false;
+}
+
+TEST(Schema, HasTheLoadersBounds) {
+  int bounds = 0;
+  walk(schema(), "", "",
+       [&](const std::string& path, const std::string& pointer, const Json& property, bool) {
+         const auto bound = [&](const char* name, double step, bool itself_allowed) {
+           if (!property.contains(name)) return;
+           ++bounds;
+           const Json limit = property[name];
+           EXPECT_EQ(refuses(pointer, limit), !itself_allowed) << path << " " << name;
+           const Json beyond = limit.is_number_integer()
+                                   ? Json(limit.get<std::int64_t>() + static_cast<std::int64_t>(step))
+                                   : Json(limit.get<double>() + step);
+           EXPECT_TRUE(refuses(pointer, beyond)) << path << " " << beyond;
+         };
+         bound("minimum", -1, true);
+         bound("maximum", 1, true);
+         bound("exclusiveMinimum", -1, false);
+       });
+  EXPECT_GT(bounds, 40);
+}
+
+TEST(Schema, ListsTheConventionsOfTheWire) {
+  std::vector<std::string> names;
+  for (const Convention convention : all_conventions())
+    if (convention != Convention::matrix) names.emplace_back(name_of(convention));
+  EXPECT_EQ(schema()["properties"]["robots"]["items"]["properties"]["convention"]["enum"], Json(names));
+}
+
+}  // namespace
+}  // namespace zeropose
