@@ -37,7 +37,7 @@ enum class CameraState {
 
 struct CameraWorkerOptions {
   std::chrono::milliseconds check_period{500};   // between signs of life of an idle camera
-  std::chrono::milliseconds overdue{700};        // a call into the device longer than this: missing
+  std::chrono::milliseconds overdue{1200};       // a call into the device longer than this: missing
   std::chrono::milliseconds first_retry{100};    // after a failed opening, doubled each time
   std::chrono::milliseconds longest_retry{800};  // up to this
   std::chrono::milliseconds in_use_retry{3500};  // after a device that another program controls

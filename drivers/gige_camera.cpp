@@ -13,7 +13,7 @@ using std::chrono::steady_clock;
 constexpr std::chrono::milliseconds repeated_command{400};
 
 constexpr int trials = 4;
-constexpr std::chrono::milliseconds trial_time{500};
+constexpr std::chrono::milliseconds trial_time{1000};
 
 bool follows(std::uint64_t id, std::uint64_t last) {
   return id == last + 1 || (last == 65535 && id == 1);  // 16-bit ids have no zero

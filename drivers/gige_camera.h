@@ -16,7 +16,7 @@ namespace zeropose {
 // to which no frame of before was ever sent.
 class GigeCamera final : public Camera {
  public:
-  // 0.05..0.2 s; 0.4 s for a dead address. Throws DeviceError.
+  // 0.05..0.2 s, and 0.3 s for start(); 1 s for a dead address. Throws DeviceError.
   explicit GigeCamera(CameraOptions options);
 
   void start() override;

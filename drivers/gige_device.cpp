@@ -24,13 +24,11 @@ constexpr int socket_buffer_bytes = 4 << 20;
 constexpr int untested_packet_bytes = 1500;
 constexpr milliseconds quiet_step{10};
 constexpr int quiet_steps_at_most = 30;
-// A frame whose packets pause so long is given up.
-constexpr guint frame_retention_us = 100'000;
 // GigE Vision 2.0, bootstrap registers: the version; who controls the device, neither bit set: nobody.
 constexpr std::uint32_t version_register = 0x0000;
 constexpr std::uint32_t control_privilege_register = 0x0a00;
 constexpr std::uint32_t control_privilege_bits = 0x3;
-constexpr milliseconds sign_of_life{400};
+constexpr milliseconds sign_of_life{1000};
 
 struct Unref {
   void operator()(gpointer object) const { g_object_unref(object); }
@@ -279,7 +277,7 @@ void GigeDevice::open_stream() {
   Owner<ArvStream> stream(arv_camera_create_stream(own.camera.get(), nullptr, nullptr, error.out()));
   own.require(error, "creating the stream");
   g_object_set(stream.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-               socket_buffer_bytes, "frame-retention", frame_retention_us, nullptr);
+               socket_buffer_bytes, nullptr);
   const unsigned payload_bytes = arv_camera_get_payload(own.camera.get(), error.out());
   own.require(error, "reading the payload size");
   for (int i = 0; i < stream_buffers; ++i)

@@ -35,7 +35,7 @@ class GigeDevice {
   bool idle() const;  // no frame is queued and none is under way
   void trigger();
   std::optional<ReceivedFrame> receive(TimePoint deadline);  // nullopt: deadline, or lost
-  // Asks the device whether it still knows us; throws when not, after 0.4 s at most.
+  // Asks the device whether it still knows us; throws when not, after 1 s at most.
   void require_control();
   bool lost() const;                    // it did not, or the library gave up its heartbeat; does not block
   CameraStatistics statistics() const;  // the library's part

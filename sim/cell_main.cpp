@@ -1,0 +1,118 @@
+// zeropose-cell: the simulated cell. Serves its cameras until it is stopped; a control socket moves the
+// object and injects faults meanwhile.
+#include <signal.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <cstdio>
+#include <iostream>
+#include <thread>
+
+#include "config/config_error.h"
+#include "protocol/line_socket.h"
+#include "sim/cell_control.h"
+#include "sim/drive.h"
+
+namespace zeropose {
+namespace {
+
+struct Options {
+  std::filesystem::path cell, control;
+  std::string shift;
+  std::vector<std::string> faults;
+  bool drives = false;
+  DriveOptions drive;
+};
+
+std::string version_text() {
+  return "zeropose-cell " ZEROPOSE_VERSION " (commit " ZEROPOSE_COMMIT ", build type " ZEROPOSE_BUILD_TYPE
+         ")\nAravis " ZEROPOSE_ARAVIS_VERSION ", CLI11 " CLI11_VERSION;
+}
+
+// Sets a flag at SIGTERM or SIGINT. To be made before any other thread, which then leaves the signals to it.
+class StopSignals {
+ public:
+  StopSignals() {
+    sigemptyset(&signals_);
+    for (const int signal : {SIGTERM, SIGINT}) sigaddset(&signals_, signal);
+    pthread_sigmask(SIG_BLOCK, &signals_, nullptr);
+    thread_ = std::jthread([this](const std::stop_token& token) { wait(token); });
+  }
+  const std::atomic<bool>& stopped() const { return stopped_; }
+
+ private:
+  void wait(const std::stop_token& token) {
+    constexpr timespec patience{0, 100'000'000};
+    while (!token.stop_requested() && sigtimedwait(&signals_, nullptr, &patience) < 0) continue;
+    stopped_ = true;
+    stopped_.notify_all();
+  }
+
+  sigset_t signals_{};
+  std::atomic<bool> stopped_ = false;
+  std::jthread thread_;
+};
+
+// The truth stands beside the cell file: car-body.json, car-body.sim.json.
+std::filesystem::path sim_file_of(std::filesystem::path cell) { return cell.replace_extension(".sim.json"); }
+
+int run(const Options& options) {
+  const StopSignals signals;
+  const Cell cell = load_cell(options.cell);
+  SimulatedCell simulated(cell, load_scene(cell, sim_file_of(options.cell)));
+  const Pose X_WO_nominal = simulated.scene().X_WO_nominal;
+  if (!options.shift.empty()) simulated.show(X_WO_nominal * pose_from_text(options.shift));
+  for (const std::string& fault : options.faults) set_fault(simulated, fault);
+  std::optional<LineServer> control;
+  if (!options.control.empty())
+    control.emplace(options.control,
+                    [&simulated](const std::string& line) { return answer_cell_control(simulated, line); });
+  std::fprintf(stderr, "zeropose-cell: serving %zu cameras of cell %s\n", cell.cameras.size(),
+               cell.name.c_str());
+  if (options.drives)
+    return drive(
+        cell, X_WO_nominal, [&simulated](const Pose& X_WO) { simulated.show(X_WO); }, options.drive,
+        signals.stopped());
+  signals.stopped().wait(false);
+  return 0;
+}
+
+void add_options(CLI::App& app, Options& options) {
+  app.set_version_flag("--version", version_text());
+  app.add_option("--cell", options.cell, "the cell file; the truth is read from CELL.sim.json beside it")
+      ->required();
+  app.add_option("--shift", options.shift, "where the object stands from its nominal pose: x,y,z,rx,ry,rz");
+  app.add_option("--fault", options.faults,
+                 "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK");
+  app.add_option("--control", options.control, "Unix socket that moves the object and injects faults");
+  auto* drives =
+      app.add_flag("--drive", options.drives, "run the robot's program: one shifted car after the other");
+  app.add_option("--cars", options.drive.cars, "with --drive: stop after so many cars")->needs(drives);
+  app.add_option("--seed", options.drive.seed, "with --drive: of the shifts")->needs(drives);
+}
+
+}  // namespace
+}  // namespace zeropose
+
+int main(int argc, char** argv) {
+  CLI::App app("zeropose-cell: a simulated cell with cameras on loopback");
+  zeropose::Options options;
+  zeropose::add_options(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    return zeropose::run(options);
+  } catch (const zeropose::ConfigError& error) {
+    std::cerr << error.what() << '\n';
+    return 2;
+  } catch (const std::invalid_argument& error) {
+    std::cerr << "zeropose-cell: " << error.what() << '\n';
+    return 2;
+  } catch (const std::exception& error) {
+    std::cerr << "zeropose-cell: " << error.what() << '\n';
+    return 1;
+  }
+}

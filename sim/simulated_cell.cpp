@@ -1,0 +1,123 @@
+#include "sim/simulated_cell.h"
+
+#include <algorithm>
+#include <future>
+#include <stdexcept>
+#include <utility>
+
+namespace zeropose {
+namespace {
+
+std::vector<ServedCamera> served(const std::vector<CameraOptions>& cameras) {
+  std::vector<ServedCamera> all;
+  for (const CameraOptions& camera : cameras)
+    all.push_back({camera.name, camera.address, camera.width_px, camera.height_px});
+  return all;
+}
+
+}  // namespace
+
+CellPictures::CellPictures(const Scene& scene)
+    : noise_sigma_grey_(scene.picture.noise_sigma_grey), clean_(scene.cameras.size()) {
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    renderers_.emplace_back(scene, i);
+    noise_states_.push_back(scene.picture.seed * 1000 + i);
+  }
+  show(scene.X_WO_nominal, {});
+}
+
+void CellPictures::show(const Pose& X_WO, const Faults& faults) {
+  std::vector<std::future<Clean>> under_way;
+  for (const CameraRenderer& renderer : renderers_)
+    under_way.push_back(std::async(std::launch::async, [&] { return renderer.clean_picture(X_WO, faults); }));
+  std::vector<std::shared_ptr<const Clean>> fresh;
+  for (auto& picture : under_way) fresh.push_back(std::make_shared<const Clean>(picture.get()));
+  const std::lock_guard lock(mutex_);
+  clean_ = std::move(fresh);
+}
+
+void CellPictures::draw(std::size_t camera, std::span<std::uint8_t> pixels) {
+  std::shared_ptr<const Clean> clean;
+  {
+    const std::lock_guard lock(mutex_);
+    clean = clean_[camera];
+  }
+  add_noise(*clean, noise_sigma_grey_, noise_states_[camera], pixels);
+}
+
+SimulatedCell::SimulatedCell(const Cell& cell, Scene scene)
+    : scene_(std::move(scene)),
+      X_WO_(scene_.X_WO_nominal),
+      pictures_(scene_),
+      server_(served(cell.cameras), [this](std::size_t camera, std::span<std::uint8_t> pixels) {
+        pictures_.draw(camera, pixels);
+      }) {}
+
+void SimulatedCell::render() {
+  pictures_.show(X_WO_, faults_);
+  server_.picture_changed();
+}
+
+void SimulatedCell::show(const Pose& X_WO) {
+  const std::lock_guard lock(mutex_);
+  X_WO_ = X_WO;
+  render();
+}
+
+Pose SimulatedCell::pose() const {
+  const std::lock_guard lock(mutex_);
+  return X_WO_;
+}
+
+Faults SimulatedCell::faults() const {
+  const std::lock_guard lock(mutex_);
+  return faults_;
+}
+
+void SimulatedCell::require_mark(const std::string& mark) const {
+  if (std::ranges::find(scene_.marks, mark, &Mark::name) == scene_.marks.end())
+    throw std::invalid_argument("no mark '" + mark + "' in the cell");
+}
+
+std::size_t SimulatedCell::index_of(const std::string& camera) const {
+  const auto found = std::ranges::find(scene_.cameras, camera, &CalibratedCamera::name);
+  if (found == scene_.cameras.end()) throw std::invalid_argument("no camera '" + camera + "' in the cell");
+  return static_cast<std::size_t>(found - scene_.cameras.begin());
+}
+
+bool SimulatedCell::camera_runs(const std::string& camera) const { return server_.running(index_of(camera)); }
+
+void SimulatedCell::cover_mark(const std::string& mark) {
+  require_mark(mark);
+  const std::lock_guard lock(mutex_);
+  faults_.covered.insert(mark);
+  render();
+}
+
+void SimulatedCell::displace_mark(const std::string& mark, double displacement_px) {
+  require_mark(mark);
+  const std::lock_guard lock(mutex_);
+  faults_.displaced_px[mark] = displacement_px;
+  render();
+}
+
+void SimulatedCell::stop_camera(const std::string& camera) { server_.stop_camera(index_of(camera)); }
+
+void SimulatedCell::start_camera(const std::string& camera) { server_.start_camera(index_of(camera)); }
+
+void SimulatedCell::lose_packets(const std::string& camera, double ratio) {
+  if (!(ratio >= 0 && ratio <= 1)) throw std::invalid_argument("ratio must lie in 0..1");
+  server_.lose_packets(index_of(camera), ratio);
+}
+
+void SimulatedCell::clear_faults() {
+  for (std::size_t i = 0; i < scene_.cameras.size(); ++i) {
+    server_.start_camera(i);
+    server_.lose_packets(i, 0);
+  }
+  const std::lock_guard lock(mutex_);
+  faults_ = {};
+  render();
+}
+
+}  // namespace zeropose

@@ -1,0 +1,70 @@
+// The simulated cell as a whole: the scene, its pictures, the cameras that serve them, and what may be done
+// to it while it runs.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "config/cell.h"
+#include "sim/gige_server.h"
+#include "sim/renderer.h"
+#include "sim/scene.h"
+
+namespace zeropose {
+
+// The pictures that the cameras see at the moment, without noise, and the noise of every frame.
+class CellPictures {
+ public:
+  explicit CellPictures(const Scene& scene);  // shows the object at its nominal pose
+
+  void show(const Pose& X_WO, const Faults& faults);  // renders all cameras side by side
+  // The frame that a camera takes now; the noise of every call is new. One thread for each camera at a time.
+  void draw(std::size_t camera, std::span<std::uint8_t> pixels);
+
+ private:
+  using Clean = std::vector<float>;
+
+  const double noise_sigma_grey_;
+  std::vector<CameraRenderer> renderers_;
+  std::vector<std::uint64_t> noise_states_;
+  std::mutex mutex_;
+  std::vector<std::shared_ptr<const Clean>> clean_;
+};
+
+// Calls may come from several threads and throw std::invalid_argument for names that the cell does not know.
+class SimulatedCell {
+ public:
+  // Shows the object at its nominal pose. Throws std::runtime_error when a camera cannot be served.
+  SimulatedCell(const Cell& cell, Scene scene);
+
+  // X_WO. Frames exposed after the return show the object there; the same for all faults.
+  void show(const Pose& X_WO);
+  Pose pose() const;
+  Faults faults() const;
+  const Scene& scene() const { return scene_; }
+  bool camera_runs(const std::string& camera) const;
+
+  void cover_mark(const std::string& mark);
+  void displace_mark(const std::string& mark, double displacement_px);
+  void stop_camera(const std::string& camera);
+  void start_camera(const std::string& camera);
+  void lose_packets(const std::string& camera, double ratio);  // of the stream, 0..1
+  void clear_faults();                                         // also brings the cameras back
+
+ private:
+  void require_mark(const std::string& mark) const;
+  std::size_t index_of(const std::string& camera) const;
+  void render();  // with mutex_ held
+
+  const Scene scene_;
+  mutable std::mutex mutex_;
+  Pose X_WO_;
+  Faults faults_;
+  CellPictures pictures_;
+  GigeServer server_;
+};
+
+}  // namespace zeropose
