@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocol/handshake.h"
+#include "tests/protocol/amount.h"
 
 namespace zeropose {
 namespace {
@@ -265,10 +266,10 @@ void run(std::uint64_t seed, bool chaos, std::size_t operations) {
 }
 
 // Reports are doubled, late, out of order, and come for ids used again: the ticket tells them apart.
-TEST(HandshakeModel, RandomOperationsWithTickets) { run(20, true, 600000); }
+TEST(HandshakeModel, RandomOperationsWithTickets) { run(20, true, amount(600000)); }
 
 // A cycle that copies the id only and reports each request at most once, but as late as it likes.
-TEST(HandshakeModel, RandomOperationsWithIdsOnly) { run(21, false, 600000); }
+TEST(HandshakeModel, RandomOperationsWithIdsOnly) { run(21, false, amount(600000)); }
 
 }  // namespace
 }  // namespace zeropose

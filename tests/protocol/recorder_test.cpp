@@ -172,11 +172,18 @@ class WildCycle {
     report.correction.translation().x() = 0.001 * (request.id % 1000);
     if (fate == 2) report.code = Code::deviation_not_attributable;
     if (fate == 3) report.correction.translation().z() = 1e9;
-    if (fate == 4) link_->publish(report_of(request.id + 1));
+    if (fate == 4) publish_foreign(request);
     if (fate == 5) link_->set_cell_state(ready_cell());
     recorder_.reported(report);
     link_->publish(report);
     if (fate == 6) link_->publish(report);
+  }
+
+  // The id may even be that of the request that follows, when this one is late: the ticket is not.
+  void publish_foreign(const Request& request) {
+    Report foreign = report_of(request.id + 1);
+    foreign.ticket = request.ticket;
+    link_->publish(foreign);
   }
 
   Recorder& recorder_;
