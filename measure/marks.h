@@ -21,6 +21,7 @@ struct MarkSearch {
       Eigen::Vector2d::Zero();                      // the window is expected +- this, cut to the image
   double min_diameter_px = 0, max_diameter_px = 0;  // of the ellipse's longer axis
   double min_axis_ratio = 0.3;                      // shorter / longer axis
+  double min_contrast = 15;                         // grey levels
 };
 
 enum class MarkStatus {

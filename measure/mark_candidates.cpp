@@ -1,0 +1,181 @@
+#include "measure/mark_candidates.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+namespace zeropose {
+namespace {
+
+constexpr int coarsest_step = 14, finest_step = 4;  // grey levels
+constexpr double size_margin_px = 2;                // the region at one level against the fitted outline
+
+struct GreyRange {
+  int low = 0, high = 0;
+};
+
+// Between the grey levels that fewer pixels than a small mark has lie below, or above.
+GreyRange range_of(const ImageView& image, const PixelWindow& window, const MarkSearch& search) {
+  std::array<int, 256> histogram{};
+  const double mark =
+      0.25 * std::numbers::pi * search.min_diameter_px * search.min_diameter_px * search.min_axis_ratio;
+  const int stride = mark > 400 ? 3 : mark > 100 ? 2 : 1;
+  for (int v = window.v0; v <= window.v1; v += stride) {
+    const std::uint8_t* row = image.row(v);
+    for (int u = window.u0; u <= window.u1; u += stride) ++histogram[row[u]];
+  }
+  const int few = std::max(1, static_cast<int>(0.25 * mark / (stride * stride)));
+  GreyRange range{0, 255};
+  for (int sum = 0; range.low < 255 && (sum += histogram[std::size_t(range.low)]) < few;) ++range.low;
+  for (int sum = 0; range.high > 0 && (sum += histogram[std::size_t(range.high)]) < few;) --range.high;
+  return range;
+}
+
+double sample(const ImageView& image, const Eigen::Vector2d& at) {
+  const double u = std::clamp(at.x(), 0.0, image.width_px - 1.001);
+  const double v = std::clamp(at.y(), 0.0, image.height_px - 1.001);
+  const int iu = static_cast<int>(u), iv = static_cast<int>(v);
+  const double fu = u - iu, fv = v - iv;
+  const std::uint8_t *a = image.row(iv) + iu, *b = image.row(iv + 1) + iu;
+  return (1 - fv) * ((1 - fu) * a[0] + fu * a[1]) + fv * ((1 - fu) * b[0] + fu * b[1]);
+}
+
+// Grey levels on both sides of an outline.
+struct Sides {
+  double inside = 0, outside = 0;  // medians
+  double sound_share = 0;  // of the directions with at least half of the median contrast, in its sense
+};
+
+Sides sides_of(const ImageView& image, const Eigen::Vector2d& centre_px, const Eigen::Matrix2d& shape_px2) {
+  constexpr std::size_t directions = 32;
+  const HalfAxes axes = half_axes(shape_px2);
+  const Eigen::Vector2d major(std::cos(axes.angle_rad), std::sin(axes.angle_rad));
+  const Eigen::Vector2d minor(-major.y(), major.x());
+  const double inwards = std::min(2.5, 0.6 * axes.minor_px);
+  std::array<double, directions> in{}, out{};
+  for (std::size_t k = 0; k < directions; ++k) {
+    const double angle = 2 * std::numbers::pi * double(k) / directions, c = std::cos(angle),
+                 s = std::sin(angle);
+    const Eigen::Vector2d on = axes.major_px * c * major + axes.minor_px * s * minor;
+    const Eigen::Vector2d normal = (axes.minor_px * c * major + axes.major_px * s * minor).normalized();
+    in[k] = sample(image, centre_px + on - inwards * normal);
+    out[k] = sample(image, centre_px + on + 2.5 * normal);
+  }
+  const auto median = [](std::array<double, directions> values) {
+    std::nth_element(values.begin(), values.begin() + directions / 2, values.end());
+    return values[directions / 2];
+  };
+  Sides sides{median(in), median(out), 0};
+  const double contrast = sides.outside - sides.inside;
+  int sound = 0;
+  for (std::size_t k = 0; k < directions; ++k) sound += (out[k] - in[k]) / contrast > 0.5 ? 1 : 0;
+  sides.sound_share = sound / double{directions};
+  return sides;
+}
+
+// Reasons by how near to a found mark they are.
+int telling(MarkStatus status) {
+  switch (status) {
+    case MarkStatus::too_small:
+      return 1;
+    case MarkStatus::cut_off:
+      return 2;
+    case MarkStatus::low_contrast:
+      return 3;
+    default:
+      return 0;
+  }
+}
+
+}  // namespace
+
+CandidateSearch CandidateFinder::find(const ImageView& image, const PixelWindow& window,
+                                      const MarkSearch& search) {
+  groups_.clear();
+  reason_ = MarkStatus::no_candidate;
+  const GreyRange range = range_of(image, window, search);
+  if (range.high - range.low < search.min_contrast) return {{}, MarkStatus::low_contrast};
+  CandidateSearch result;
+  double step = (range.high - range.low) / std::ceil((range.high - range.low) / double{coarsest_step});
+  double first = range.low + step / 2;
+  for (;; first = range.low + step / 4, step /= 2) {
+    for (double level = first; level < range.high; level += step) {
+      look_at_level(image, window, search, static_cast<int>(std::lround(level)));
+    }
+    result = judge(image, search);
+    if (!result.candidates.empty() || step < 2 * finest_step) return result;
+  }
+}
+
+void CandidateFinder::look_at_level(const ImageView& image, const PixelWindow& window,
+                                    const MarkSearch& search, int level) {
+  const auto suggest = [this](MarkStatus status) {
+    if (telling(status) > telling(reason_)) reason_ = status;
+  };
+  const double largest = search.max_diameter_px + size_margin_px;
+  const BlobLimits limits{std::max(4.0, 0.4 * search.min_diameter_px), largest};
+  for (const Blob& blob : blobs_.find(image, window, level, search.kind == MarkKind::bright_disc, limits)) {
+    const double longest = std::max(blob.box.width(), blob.box.height());
+    const double box_area = double(blob.box.width()) * blob.box.height();
+    if (blob.touches_window) {
+      if (longest > 0.6 * search.min_diameter_px && double(blob.area) > 0.65 * box_area) {
+        suggest(MarkStatus::cut_off);
+      }
+      continue;
+    }
+    const HalfAxes axes = half_axes(blob.shape_px2);
+    if (!(blob.misfit_px < 0.5 + 0.01 * axes.major_px) ||
+        axes.minor_px < (search.min_axis_ratio - 0.1) * axes.major_px || 2 * axes.major_px > largest) {
+      continue;
+    }
+    if (2 * axes.major_px < search.min_diameter_px - size_margin_px || axes.minor_px < 1.8) {
+      if (2 * axes.major_px > 0.6 * search.min_diameter_px) suggest(MarkStatus::too_small);
+      continue;
+    }
+    add({blob.centre_px, blob.shape_px2, axes.major_px, axes.minor_px, level});
+  }
+}
+
+// The same thing at another level has nearly the same centre and size.
+void CandidateFinder::add(const Sighting& sighting) {
+  for (Group& group : groups_) {
+    const Sighting& known = group.back();
+    const double ratio = sighting.major_px / known.major_px;
+    if ((sighting.centre_px - known.centre_px).norm() < 0.3 * known.minor_px && ratio > 0.75 &&
+        ratio < 1.33) {
+      group.push_back(sighting);
+      return;
+    }
+  }
+  groups_.push_back({sighting});
+}
+
+CandidateSearch CandidateFinder::judge(const ImageView& image, const MarkSearch& search) {
+  CandidateSearch result{{}, reason_};
+  const double sign = search.kind == MarkKind::bright_disc ? -1 : 1;
+  for (Group& group : groups_) {
+    std::sort(group.begin(), group.end(),
+              [](const Sighting& a, const Sighting& b) { return a.level < b.level; });
+    const Sighting* best = &group[group.size() / 2];
+    Sides sides = sides_of(image, best->centre_px, best->shape_px2);
+    const double middle = 0.5 * (sides.inside + sides.outside);
+    for (const Sighting& other : group) {
+      if (std::abs(other.level - middle) < std::abs(best->level - middle)) best = &other;
+    }
+    sides = sides_of(image, best->centre_px, best->shape_px2);
+    const double contrast = sign * (sides.outside - sides.inside);
+    if (!(contrast > 0) || sides.sound_share < 0.85) continue;
+    if (contrast < search.min_contrast) {
+      result.reason = MarkStatus::low_contrast;
+      continue;
+    }
+    result.candidates.push_back({{best->centre_px, best->shape_px2, sides.inside, sides.outside}, contrast});
+  }
+  std::stable_sort(result.candidates.begin(), result.candidates.end(),
+                   [](const MarkCandidate& a, const MarkCandidate& b) { return a.contrast > b.contrast; });
+  return result;
+}
+
+}  // namespace zeropose
