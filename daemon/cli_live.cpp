@@ -40,6 +40,12 @@ std::string pose_text(const Json& six) {
   return text.str();
 }
 
+std::string short_text(const Json& number) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(3) << number.get<double>();
+  return text.str();
+}
+
 std::string text_or(const Json& value, const char* key) { return value.value(key, std::string()); }
 
 void print_verdict(const Json& answer) {
@@ -70,13 +76,14 @@ void print_measurement(const Json& answer) {
   if (answer.contains("X_O0O"))
     std::cout << "  x y z mm, rx ry rz deg: " << pose_text(answer["X_O0O"]) << "\n  "
               << answer["effective_marks"] << " marks in " << answer["effective_cameras"]
-              << " cameras, largest deviation " << answer["largest_deviation_mm"] << " mm, sigma "
-              << answer["sigma_mm"] << " mm\n";
-  if (!answer.contains("marks")) return;
-  for (const auto& mark : answer["marks"])
+              << " cameras, largest deviation " << short_text(answer["largest_deviation_mm"]) << " mm, sigma "
+              << short_text(answer["sigma_mm"]) << " mm\n";
+  for (const auto& mark : answer.value("marks", Json::array()))
     if (mark["finding"] != "found" || mark.value("removed", false))
-      std::cout << "  " << text_or(mark, "camera") << " mark " << text_or(mark, "mark") << ": "
-                << (mark["finding"] == "found" ? "removed as wrong" : text_or(mark, "finding")) << '\n';
+      std::cout << "  " << text_or(mark, "camera") << ": mark " << text_or(mark, "mark") << ' '
+                << (mark["finding"] == "found" ? "removed as wrong"
+                                               : "not found: " + text_or(mark, "finding"))
+                << '\n';
 }
 
 void print_zero(const Json& answer) {

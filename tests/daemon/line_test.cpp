@@ -113,7 +113,7 @@ TEST_F(Line, WrongMarkIsNamedAndRemoved) {
   expect_right(X_WO, answer);
   const Json measured = line.ask_daemon({{"cmd", "measure"}});
   for (const auto& mark : measured["marks"]) EXPECT_EQ(mark["removed"], mark["mark"] == "camera3/1") << mark;
-  EXPECT_THAT(line.zeropose({"measure"}).out, HasSubstr("camera3/1: removed as wrong"));
+  EXPECT_THAT(line.zeropose({"measure"}).out, HasSubstr("mark camera3/1 removed as wrong"));
   line.fault("clear");
   expect_good_car(random_shift(generator));
 }
