@@ -331,6 +331,48 @@ double rms_of_rings(const EllipseBand& band, const Taken& taken, const State& st
   return count > 0 ? std::sqrt(std::max(0.0, squares / count)) : 0;
 }
 
+// Displacement of the outline by sector: least squares of the residuals on the slope across the outline.
+struct Sectors {
+  static constexpr std::size_t count = 16;
+  std::array<double, count> rs{}, ss{};
+
+  void add(double x, double y, double slope, double residual) {
+    const double ax = std::abs(x), ay = std::abs(y), low = std::min(ax, ay), high = std::max(ax, ay);
+    const std::size_t octant = (x < 0 ? 1U : 0U) + (y < 0 ? 2U : 0U) + (ax < ay ? 4U : 0U);
+    const std::size_t sector = 2 * octant + (low > 0.4142 * high ? 1U : 0U);  // tan 22.5 deg
+    rs[sector] += residual * slope;
+    ss[sector] += slope * slope;
+  }
+};
+
+Sectors sectors_of(const EllipseBand& band, const State& state) {
+  const Constants constants(state);
+  Block block;
+  Sectors sectors;
+  for (std::size_t i = 0; i + block_size <= band.grey.size(); i += block_size) {
+    differentiate(&band.grey[i], &band.x[i], &band.y[i], constants, block);
+    for (std::size_t k = 0; k < block_size; ++k) {
+      const float du = block.row[cu][k], dv = block.row[cv][k];
+      sectors.add(double{band.x[i + k]} - state.at(cu), double{band.y[i + k]} - state.at(cv),
+                  std::sqrt(double{du * du + dv * dv}), double{block.row[unknowns][k]});
+    }
+  }
+  return sectors;
+}
+
+void judge_outline(const Descent& d, EllipseFit& fit) {
+  const Sectors sectors = sectors_of(d.band, d.state);
+  const double noise2 = fit.flat_rms > 0 ? fit.flat_rms * fit.flat_rms : rounding_variance;
+  double square = 0, noise_square = 0;
+  for (std::size_t k = 0; k < Sectors::count; ++k) {
+    if (!(sectors.ss[k] > 0)) continue;
+    square += (sectors.rs[k] / sectors.ss[k]) * (sectors.rs[k] / sectors.ss[k]) / Sectors::count;
+    noise_square += noise2 / sectors.ss[k] / Sectors::count;
+  }
+  fit.outline_px = std::sqrt(square);
+  fit.outline_noise_px = std::sqrt(noise_square);
+}
+
 EllipseFit report(const Descent& d) {
   const EllipseBand& band = d.band;
   EllipseFit fit;
@@ -351,6 +393,7 @@ EllipseFit report(const Descent& d) {
   fit.flat_count = d.normal.count - fit.edge_count;
   const double flat_squares = fit.flat_rms * fit.flat_rms * fit.flat_count;
   fit.edge_rms = std::sqrt(std::max(0.0, d.normal.squares - flat_squares) / fit.edge_count);
+  judge_outline(d, fit);
   fit.saturated_share = band.saturated / fit.edge_count;
   fit.converged = solver.info() == Eigen::Success && fit.covariance_px2.allFinite() &&
                   fit.covariance_px2.determinant() > 0 && fit.covariance_px2(0, 0) > 0;

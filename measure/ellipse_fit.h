@@ -26,6 +26,8 @@ struct EllipseFit {
   double edge_rms = 0;                    // grey levels: residuals in the band across the outline
   double flat_rms = 0;                    // in the flat rings beside it that were taken; 0 if none was
   double edge_count = 0, flat_count = 0;  // pixels behind the two
+  double outline_px = 0;                  // how far the outline is from the ellipse: rms over sixteen sectors
+  double outline_noise_px = 0;            // what the noise alone makes of that
   double saturated_share = 0;             // of the band's pixels that stand at 255
   int iterations = 0;
 };

@@ -14,8 +14,9 @@ constexpr std::size_t most_candidates = 8;  // fits per window
 constexpr double rival_contrast = 0.4;      // of the best one's: then it is a rival
 constexpr double model_share = 0.04;        // of the contrast: how far real edges are from the model, rms
 constexpr double noise_sigmas = 4;          // how far two variances of the same noise may differ
-constexpr double most_noise_share = 0.3;    // of the contrast
-constexpr double saturated_share = 0.02;    // of the pixels across the outline
+constexpr double rough_px = 0.15;         // what the outline of a real mark may deviate from an ellipse, rms
+constexpr double most_noise_share = 0.3;  // of the contrast
+constexpr double saturated_share = 0.02;  // of the pixels across the outline
 
 bool makes_sense(const ImageView& image, const MarkSearch& s) {
   return image.data != nullptr && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
@@ -63,9 +64,11 @@ bool explains(const EllipseFit& fit, const MarkFinding& finding, const EllipseSt
   const double spread = std::sqrt(2 / fit.edge_count + 2 / std::max(1.0, fit.flat_count));
   const double model = model_share * finding.contrast;
   const double allowed2 = noise * noise * (1 + noise_sigmas * spread) + model * model;
+  const double outline2 = 2.5 * fit.outline_noise_px * fit.outline_noise_px + rough_px * rough_px;
   const HalfAxes before = half_axes(start.shape_px2);
   const double room = 1 + 0.05 * before.major_px;
-  return fit.edge_rms * fit.edge_rms < allowed2 && (fit.centre_px - start.centre_px).norm() < room &&
+  return fit.edge_rms * fit.edge_rms < allowed2 && fit.outline_px * fit.outline_px < outline2 &&
+         (fit.centre_px - start.centre_px).norm() < room &&
          std::abs(0.5 * finding.diameter_px - before.major_px) < room;
 }
 
