@@ -117,10 +117,9 @@ CsvTable::CsvTable(std::string_view text, std::string file, const CsvColumns& co
       continue;
     }
     rows_.push_back({line, cells_of(content)});
-    if (rows_.back().cells.size() != header_.size() && mistakes_.size() < max_mistakes)
-      mistakes_.push_back(
-          concat({file_, ":", std::to_string(line), ": found ", std::to_string(rows_.back().cells.size()),
-                  " values, expected the ", std::to_string(header_.size()), " of the header"}));
+    if (rows_.back().cells.size() != header_.size())
+      note(concat({file_, ":", std::to_string(line), ": found ", std::to_string(rows_.back().cells.size()),
+                   " values, expected the ", std::to_string(header_.size()), " of the header"}));
   }
   read_header(columns);
   throw_if_wrong();
@@ -193,13 +192,21 @@ double CsvTable::number_or(std::size_t row, std::string_view column, double fall
 
 void CsvTable::add_mistake(std::size_t row, std::string_view column, std::string_view found,
                            std::string_view expected) {
-  if (mistakes_.size() == max_mistakes) return;
-  mistakes_.push_back(concat({file_, ":", std::to_string(rows_.at(row).line), ": ", column, ": found ", found,
-                              ", expected ", expected}));
+  note(concat({file_, ":", std::to_string(rows_.at(row).line), ": ", column, ": found ", found, ", expected ",
+               expected}));
+}
+
+void CsvTable::note(std::string mistake) {
+  if (mistakes_.size() < max_mistakes)
+    mistakes_.push_back(std::move(mistake));
+  else
+    ++uncounted_;
 }
 
 void CsvTable::throw_if_wrong() const {
-  if (!mistakes_.empty()) throw ConfigError(mistakes_);
+  std::vector<std::string> all = mistakes_;
+  if (uncounted_ > 0) all.push_back(concat({file_, ": and ", std::to_string(uncounted_), " mistakes more"}));
+  if (!all.empty()) throw ConfigError(std::move(all));
 }
 
 CsvTable load_csv(const std::filesystem::path& path, const CsvColumns& columns) {

@@ -43,6 +43,7 @@ class CsvTable {
     std::vector<std::string> cells;
   };
 
+  void note(std::string mistake);
   void read_header(const CsvColumns& columns);
   const std::string* cell(std::size_t row, std::string_view column) const;
 
@@ -51,6 +52,7 @@ class CsvTable {
   std::vector<std::string> header_;
   std::vector<Row> rows_;
   std::vector<std::string> mistakes_;
+  std::size_t uncounted_ = 0;  // beyond the first hundred
 };
 
 CsvTable load_csv(const std::filesystem::path& path, const CsvColumns& columns);

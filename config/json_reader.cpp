@@ -70,13 +70,15 @@ JsonReading JsonReading::of_the_format() {
 
 void JsonReading::add_mistake(const std::string& path, const std::string& found,
                               const std::string& expected) {
-  if (mistakes_.size() == max_mistakes) {
+  if (only_counts()) {
     ++uncounted_;
     return;
   }
   mistakes_.push_back(file_ + ": " + (path.empty() ? "" : path + ": ") + "found " + found + ", expected " +
                       expected);
 }
+
+bool JsonReading::only_counts() const { return mistakes_.size() == max_mistakes; }
 
 std::vector<std::string> JsonReading::mistakes() const {
   std::vector<std::string> all = mistakes_;
@@ -328,13 +330,13 @@ void JsonObject::read_members(const std::function<void(const std::string&, JsonO
 void JsonObject::finish() {
   const auto* object = std::get_if<JsonValue::Object>(&value_.value);
   if (object == nullptr || any_key_) return;
+  const std::vector<std::string_view> known(asked_.begin(), asked_.end());
   for (const auto& [key, value] : *object) {
     if (asked_.contains(key)) continue;
-    std::vector<std::string_view> known(asked_.begin(), asked_.end());
-    const std::string_view close = closest(key, known);
-    const std::string expected =
-        close.empty() ? std::string("no key of this name") : concat({in_quotes(close), "?"});
-    reading_.add_mistake(path(key), "an unknown key", expected);
+    const std::string_view close = reading_.only_counts() ? std::string_view() : closest(key, known);
+    reading_.add_mistake(
+        path(key), "an unknown key",
+        close.empty() ? std::string("no key of this name") : concat({in_quotes(close), "?"}));
   }
 }
 

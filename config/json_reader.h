@@ -36,6 +36,7 @@ class JsonReading {
   // Throws ConfigError. More than a hundred mistakes are counted only.
   void throw_if_wrong() const;
   std::vector<std::string> mistakes() const;
+  bool only_counts() const;  // there are a hundred already
 
   // The path of every key that was asked for, indices as []: "jobs[].marks[].name".
   const std::set<std::string>& known_keys() const { return known_keys_; }

@@ -77,6 +77,14 @@ TEST(Csv, CellMistakesAreNamedAllAtOnce) {
                           "t.csv:4: y: found \"11\", expected a number from -10 to 10"));
 }
 
+TEST(Csv, ManyMistakesAreCounted) {
+  std::string text = "name,x,y\n";
+  for (int i = 0; i < 150; ++i) text += "a,b,0\n";
+  const std::vector<std::string> mistakes = mistakes_in(text);
+  ASSERT_EQ(mistakes.size(), 101U);
+  EXPECT_EQ(mistakes.back(), "t.csv: and 50 mistakes more");
+}
+
 TEST(Csv, NumbersAreFiniteAndWhole) {
   double number = 7;
   for (const char* bad :

@@ -81,6 +81,13 @@ TEST(JsonTree, LongTextsAreCutBetweenLetters) {
   EXPECT_NO_THROW(Json(text).dump());
 }
 
+// R12: a large file of nothing but unknown keys.
+TEST(JsonTree, HugeFilesAreRefused) {
+  std::string text = "{\"a\": 0";
+  for (int i = 0; text.size() < max_file_bytes / 4; ++i) text += ", \"key" + std::to_string(i) + "\": 1";
+  EXPECT_EQ(mistakes_in(text + "}").size(), 101U);
+}
+
 // R12: whatever happens to the file, it is refused whole or read whole.
 TEST(JsonTree, EveryTruncationOfTheCellIsRefused) {
   const std::string& text = example_text();
