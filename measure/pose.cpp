@@ -93,15 +93,18 @@ bool same_place(const PoseModel& model, const CentredPose& a, const CentredPose&
 
 struct Found {
   Estimate estimate;
-  int equally_good = 1;  // poses that explain the marks as well as this one
+  int equally_good = 1;        // poses that explain the marks as well as this one
+  bool position_open = false;  // no start: the directions of sight are parallel
 };
 
 // The best of several starts.
 Found estimate_from_anywhere(PoseModel& model, const Estimate& first) {
+  const auto starts = start_poses(model, max_starts);
+  if (!starts) return {first, 1, first.solution.status == SolverStatus::failed};
   std::vector<Estimate> estimates;
   if (first.ok()) estimates.push_back(first);
   Estimate failed = first;
-  for (const CentredPose& start : start_poses(model, max_starts)) {
+  for (const CentredPose& start : *starts) {
     Estimate next = estimate(model, start);
     if (!next.ok()) {
       if (failed.solution.status != SolverStatus::converged) failed = next;
@@ -126,7 +129,8 @@ Found find_pose(PoseModel& model, const std::optional<Pose>& X_WO_start) {
   Estimate first;
   if (X_WO_start) {
     first = estimate(model, model.centred(*X_WO_start));
-    if (first.ok() && plausible(model)) return {std::move(first), 1};
+    if (first.solution.status == SolverStatus::singular || (first.ok() && plausible(model)))
+      return {std::move(first), 1};
   }
   return estimate_from_anywhere(model, first);
 }
@@ -219,13 +223,20 @@ Code fault_of(const PoseModel& model, const Found& found, std::string& reason) {
              " observations equally well";
     return Code::geometry_degenerate;
   }
+  if (found.position_open) {
+    reason = "all " + number(model.active_count()) +
+             " directions of sight are parallel, they leave the position along them open";
+    return Code::geometry_degenerate;
+  }
   if (solution.status == SolverStatus::converged) {
     if (found.estimate.precision.determined) return Code::ok;
     reason = why_degenerate(model, found.estimate.precision);
     return Code::geometry_degenerate;
   }
-  const Precision precision = precision_of(model, solution);
-  if (solution.status == SolverStatus::not_converged && !precision.determined) {
+  const bool tried =
+      solution.status == SolverStatus::not_converged || solution.status == SolverStatus::singular;
+  const Precision precision = tried ? precision_of(model, solution) : Precision{};
+  if (tried && !precision.determined) {
     reason = why_degenerate(model, precision);
     return Code::geometry_degenerate;
   }

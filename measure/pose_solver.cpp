@@ -17,8 +17,9 @@ constexpr double last_step_mm = 1e-5, next_step_mm = 1e-7;
 constexpr double offset_step_mm = 1e-2;
 constexpr int max_rounds = 100;
 
-// Beyond this the normal matrix is singular within rounding.
-constexpr double max_condition = 1e13;
+// Beyond this the geometry leaves a direction open: one camera that sees marks 1000 times closer to each
+// other than to itself stays below 1e8.
+constexpr double max_condition = 1e10;
 // A pose that is known no better than this share of the marks' extent, one sigma, is a guess: 17 degrees.
 constexpr double max_sigma_share = 0.3;
 
@@ -28,7 +29,7 @@ Vector6 scales(const PoseModel& model) {
   return scale;
 }
 
-// Solves (N + damping diag N) delta = g in the free directions.
+// Solves (N + damping diag N) delta = g in the free directions. False when singular.
 bool solve_step(const PoseModel& model, const NormalEquations& equations, double damping, Vector6& delta) {
   const Vector6 scale = scales(model);
   Matrix6 N = scale.asDiagonal() * equations.N * scale.asDiagonal();
@@ -38,12 +39,12 @@ bool solve_step(const PoseModel& model, const NormalEquations& equations, double
     Eigen::Matrix3d N3 = basis.transpose() * N * basis;
     N3.diagonal() *= 1 + damping;
     const SmallCholesky<3> cholesky(N3);
-    if (!cholesky.ok()) return false;
+    if (!cholesky.ok() || cholesky.condition_at_least() > max_condition) return false;
     delta = scale.cwiseProduct(basis * cholesky.solve(basis.transpose() * g));
   } else {
     N.diagonal() *= 1 + damping;
     const SmallCholesky<6> cholesky(N);
-    if (!cholesky.ok()) return false;
+    if (!cholesky.ok() || cholesky.condition_at_least() > max_condition) return false;
     delta = scale.cwiseProduct(cholesky.solve(g));
   }
   return delta.allFinite();
@@ -52,7 +53,6 @@ bool solve_step(const PoseModel& model, const NormalEquations& equations, double
 double length_mm(const PoseModel& model, const Vector6& delta) {
   return delta.head<3>().norm() + model.extent_mm() * delta.tail<3>().norm();
 }
-
 
 // Levenberg-Marquardt from a pose the model is linearised at.
 class Descent {
@@ -63,6 +63,7 @@ class Descent {
     for (int round = 0; round < max_rounds; ++round) {
       Vector6 delta;
       if (!solve_step(model_, solution_.equations, damping_, delta)) {
+        if (round == 0) return SolverStatus::singular;
         if (!damp()) return SolverStatus::not_converged;
         continue;
       }

@@ -6,7 +6,8 @@
 
 namespace zeropose {
 
-enum class SolverStatus { failed = 0, converged, no_image, not_converged };
+// singular: already at the start the observations leave a direction open.
+enum class SolverStatus { failed = 0, converged, no_image, not_converged, singular };
 
 struct Solution {
   SolverStatus status = SolverStatus::failed;

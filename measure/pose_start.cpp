@@ -19,6 +19,9 @@ using Matrix9 = Eigen::Matrix<double, 9, 9>;
 using Matrix39 = Eigen::Matrix<double, 3, 9>;
 using Matrix93 = Eigen::Matrix<double, 9, 3>;
 
+// Directions of sight within about 1e-4 rad are parallel.
+constexpr double parallel_rcond = 1e-8;
+
 struct Ray {
   Vector3d p_WC_mm, direction_W;  // unit length
   Vector3d p_MQ_mm;
@@ -73,7 +76,7 @@ std::optional<DistanceForm> distance_form(const std::vector<Ray>& rays) {
     marks += ray.across * product_with(ray.p_MQ_mm);
   }
   const Eigen::FullPivLU<Matrix3d> lu(sum);
-  if (rays.size() < 3 || lu.rcond() < 1e-12) return std::nullopt;
+  if (rays.size() < 3 || lu.rcond() < parallel_rcond) return std::nullopt;
   DistanceForm form;
   form.p0 = lu.solve(eyes);
   form.S = lu.solve(marks);
@@ -140,12 +143,12 @@ struct Candidate {
 
 bool cheaper(const Candidate& a, const Candidate& b) { return a.cost < b.cost; }
 
-std::vector<CentredPose> spatial_starts(const PoseModel& model, std::size_t count) {
+std::optional<std::vector<CentredPose>> spatial_starts(const PoseModel& model, std::size_t count) {
   constexpr int grid = 256;
   constexpr std::size_t refined = 48;
   const std::vector<Ray> rays = rays_of(model);
   const auto form = distance_form(rays);
-  if (!form) return {};
+  if (!form) return std::nullopt;
   std::vector<Candidate> candidates;
   for (int i = 0; i < grid; ++i) {
     const Matrix3d R = spread_rotation(i, grid);
@@ -193,8 +196,9 @@ std::vector<CentredPose> planar_start(const PoseModel& model) {
 
 }  // namespace
 
-std::vector<CentredPose> start_poses(const PoseModel& model, std::size_t count) {
-  return model.planar() ? planar_start(model) : spatial_starts(model, count);
+std::optional<std::vector<CentredPose>> start_poses(const PoseModel& model, std::size_t count) {
+  if (model.planar()) return planar_start(model);
+  return spatial_starts(model, count);
 }
 
 }  // namespace zeropose

@@ -33,6 +33,12 @@ class SmallCholesky {
 
   bool ok() const { return ok_; }
 
+  // A lower bound of the condition number.
+  double condition_at_least() const {
+    const double ratio = L_.diagonal().maxCoeff() / L_.diagonal().minCoeff();
+    return ratio * ratio;
+  }
+
   Vector solve(Vector b) const {
     for (int i = 0; i < n; ++i) {
       for (int k = 0; k < i; ++k) b(i) -= L_(i, k) * b(k);
