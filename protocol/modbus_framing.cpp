@@ -21,7 +21,7 @@ bool pdu_is_whole(const Adu& adu) {
     case write_multiple_registers: {
       if (pdu < 6) return false;
       const std::size_t byte_count = adu.bytes[header + 5];
-      return byte_count >= 2 && byte_count == 2u * adu.quantity() && pdu == 6 + byte_count;
+      return byte_count >= 2 && byte_count == 2 * std::size_t{adu.quantity()} && pdu == 6 + byte_count;
     }
     default:
       return true;

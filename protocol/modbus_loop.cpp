@@ -29,7 +29,7 @@ HandshakeOptions with_new_epoch(HandshakeOptions options) {
   return options;
 }
 
-const ModbusServerOptions& checked(const ModbusServerOptions& options) {
+ModbusServerOptions checked(ModbusServerOptions options) {
   if (options.max_clients == 0) throw std::invalid_argument("Modbus: max_clients must be at least 1");
   if (options.frame_time <= milliseconds(0))
     throw std::invalid_argument("Modbus: frame_time must be positive");

@@ -22,6 +22,7 @@ in_addr_t parse(const std::string& address) {
 
 std::vector<in_addr_t> parse_all(const std::vector<std::string>& addresses) {
   std::vector<in_addr_t> parsed;
+  parsed.reserve(addresses.size());
   for (const std::string& address : addresses) parsed.push_back(parse(address));
   return parsed;
 }

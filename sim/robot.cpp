@@ -205,7 +205,7 @@ RobotAnswer SimulatedRobot::command(CommandKind kind, std::uint16_t job, std::ui
   expected.part = part;
   expected.last_used_id = last_used_id_;
   last_id_ = expected.request_id;
-  const RobotAnswer sent = send({expected.request_id, static_cast<std::uint16_t>(kind), job, part, argument});
+  RobotAnswer sent = send({expected.request_id, static_cast<std::uint16_t>(kind), job, part, argument});
   if (!sent.ok()) return sent;
   return wait_for_answer(kind, expected, patience);
 }

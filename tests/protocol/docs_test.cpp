@@ -4,7 +4,6 @@
 #include <fstream>
 #include <sstream>
 
-#include "measure/code.h"
 #include "protocol/register_map.h"
 
 namespace zeropose {
@@ -30,15 +29,6 @@ std::string framed(const std::string& text) {
   return all.str();
 }
 
-std::string codes_markdown() {
-  std::ostringstream text;
-  text << "| code | name | cause | remedy |\n|---|---|---|---|\n";
-  for (const CodeText& entry : code_table())
-    text << "| " << static_cast<int>(entry.code) << " | " << entry.name << " | " << entry.cause << " | "
-         << entry.remedy << " |\n";
-  return text.str();
-}
-
 TEST(Docs, RegisterMap) {
   EXPECT_EQ(between(page(), "<!-- register map", "<!-- end of register map"),
             framed(register_map_markdown()));
@@ -47,8 +37,6 @@ TEST(Docs, RegisterMap) {
 TEST(Docs, ValuesOnTheWire) {
   EXPECT_EQ(between(page(), "<!-- values", "<!-- end of values"), framed(wire_values_markdown()));
 }
-
-TEST(Docs, Codes) { EXPECT_EQ(between(page(), "<!-- codes", "<!-- end of codes"), framed(codes_markdown())); }
 
 }  // namespace
 }  // namespace zeropose

@@ -4,7 +4,10 @@
 //   job 3: silence, so the time-out at 200 ms                        Zero: done after 40 ms, zero id
 //   0x0A0B0C0D
 #include <chrono>
+#include <condition_variable>
+#include <deque>
 #include <iostream>
+#include <mutex>
 #include <string>
 #include <thread>
 
@@ -28,6 +31,57 @@ Report report_for(const Request& request) {
   return report;
 }
 
+// One request at a time, as the link promises.
+class Cycle {
+ public:
+  explicit Cycle(const CellState& cell) : cell_(cell), thread_([this] { run(); }) {}
+  // To be called while the link is still there; what it hands over afterwards is not answered.
+  void stop() {
+    take({});
+    thread_.join();
+  }
+  void attach(ModbusTcpLink& link) {
+    link_ = &link;
+    link.set_cell_state(cell_);
+  }
+  // A request with id 0 ends the thread; a robot cannot send one.
+  void take(const Request& request) {
+    const std::scoped_lock lock(mutex_);
+    requests_.push_back(request);
+    came_.notify_one();
+  }
+
+ private:
+  void run() {
+    while (true) {
+      std::unique_lock lock(mutex_);
+      came_.wait(lock, [this] { return !requests_.empty(); });
+      const Request request = requests_.front();
+      requests_.pop_front();
+      lock.unlock();
+      if (request.id == 0) return;
+      if (request.kind != CommandKind::reset && request.job != 3) answer(request);
+    }
+  }
+  void answer(const Request& request) {
+    std::this_thread::sleep_for(milliseconds(15));
+    link_->exposure_done(request.id);
+    std::this_thread::sleep_for(milliseconds(25));
+    if (request.kind == CommandKind::zero) {
+      cell_.zero_id = 0x0A0B0C0D;
+      link_->set_cell_state(cell_);
+    }
+    link_->publish(report_for(request));
+  }
+
+  CellState cell_;
+  ModbusTcpLink* link_ = nullptr;
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::deque<Request> requests_;
+  std::thread thread_;
+};
+
 int serve() {
   ModbusServerOptions options;
   options.port = 0;
@@ -36,25 +90,12 @@ int serve() {
   options.handshake.robot_index = 2;
   options.handshake.validity = milliseconds(600);
   options.handshake.measure_deadline = milliseconds(200);
-  CellState cell{true, true, true, true, 0x01020304, 0x05060708, 0x09090909};
-  ModbusTcpLink* published = nullptr;
-  std::vector<std::thread> cycles;
-  ModbusTcpLink link(options, [&](const Request& request) {
-    if (request.kind == CommandKind::reset || request.job == 3) return;
-    cycles.emplace_back([&, request] {
-      std::this_thread::sleep_for(milliseconds(15));
-      published->exposure_done(request.id);
-      std::this_thread::sleep_for(milliseconds(25));
-      if (request.kind == CommandKind::zero) cell.zero_id = 0x0A0B0C0D;
-      if (request.kind == CommandKind::zero) published->set_cell_state(cell);
-      published->publish(report_for(request));
-    });
-  });
-  published = &link;
-  link.set_cell_state(cell);
+  Cycle cycle(CellState{true, true, true, true, 0x01020304, 0x05060708, 0x09090909});
+  ModbusTcpLink link(options, [&](const Request& request) { cycle.take(request); });
+  cycle.attach(link);
   std::cout << "port " << link.port() << std::endl;
   for (std::string line; std::getline(std::cin, line);) continue;
-  for (std::thread& cycle : cycles) cycle.join();
+  cycle.stop();
   return 0;
 }
 
