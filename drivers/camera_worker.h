@@ -50,7 +50,7 @@ class CameraWorker {
 
   // Returns at once; the thread opens the camera and tries again until it succeeds.
   explicit CameraWorker(CameraOptions camera, Open open = open_camera, CameraWorkerOptions options = {});
-  // Waits for the thread: at once for an idle camera; up to 8 s while a lost device blocks its library. Ask
+  // Waits for the thread: at once for an idle camera; up to 11 s while a lost device blocks its library. Ask
   // all workers by request_stop() first, then the waits run side by side.
   ~CameraWorker();
   CameraWorker(const CameraWorker&) = delete;

@@ -1,5 +1,5 @@
 // A GigE Vision camera with software trigger. One thread per camera: a call into a device that is gone blocks
-// for seconds (measured: a read 4.5 s, a trigger 2.5 s, the destructor 5 s).
+// for seconds (measured: a read 4.5 s, a trigger 2.5 s, the destructor 10 s).
 #pragma once
 
 #include "drivers/camera.h"

@@ -111,6 +111,7 @@ struct GigeDevice::Handles {
   void require_set(double wanted, double got, std::string_view what) const;
   void set_packet_size(const NetworkInterface& interface);
   int tested_packet_bytes(const NetworkInterface& interface);
+  void notice_silence() noexcept;
   void wait_until_quiet();
 
   CameraOptions options;
@@ -237,6 +238,15 @@ void GigeDevice::Handles::set_packet_size(const NetworkInterface& interface) {
          std::to_string(interface.mtu_bytes) + "; raise its MTU");
 }
 
+// Saves the seconds that a command to a device costs that is gone.
+void GigeDevice::Handles::notice_silence() noexcept {
+  try {
+    if (!lost && !read_register(options.address, version_register, sign_of_life)) lost = true;
+  } catch (const DeviceError&) {
+    lost = true;
+  }
+}
+
 // Lets a frame that the camera was still sending run into the old stream.
 void GigeDevice::Handles::wait_until_quiet() {
   std::uint64_t before = count(stream.get(), "n_received_packets");
@@ -291,6 +301,7 @@ void GigeDevice::close_stream() noexcept {
   Handles& own = *handles_;
   if (!own.stream) return;
   Error error;
+  own.notice_silence();
   if (!own.lost) arv_camera_stop_acquisition(own.camera.get(), error.out());
   if (!own.lost && !error) own.wait_until_quiet();
   own.closed_streams = statistics();
