@@ -12,6 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 
 TimePoint in(std::chrono::milliseconds time) { return steady_clock::now() + time; }
@@ -77,8 +78,8 @@ TEST_F(FourCameras, LateFramesAreDropped) {
       ++(result.status == GrabStatus::ok ? ok : late);
       if (result.status == GrabStatus::ok)
         ASSERT_EQ(number_of(result.frame).scene, scene);
-      else
-        ASSERT_EQ(result.status, GrabStatus::timeout) << result.reason;
+      else  // damaged: the library now and then gives up a frame of a stream that began anew
+        ASSERT_THAT(result.status, AnyOf(GrabStatus::timeout, GrabStatus::damaged)) << result.reason;
     }
   }
   EXPECT_GT(ok, 0);
