@@ -73,18 +73,23 @@ void add_flat(const std::uint8_t* row, int from, int to, int origin_u, int y, Ri
   sums.gg += sgg;
 }
 
+// Precondition: the band has room.
 void add_edge(const std::uint8_t* row, int from, int to, int y, EllipseBand& band) {
-  if (to < from) return;
-  const std::size_t n = band.grey.size(), more = static_cast<std::size_t>(to - from + 1);
-  band.grey.resize(n + more);
-  band.x.resize(n + more);
-  band.y.resize(n + more, static_cast<float>(y));
-  for (std::size_t i = 0; i < more; ++i) {
-    const int u = from + static_cast<int>(i);
-    band.grey[n + i] = static_cast<float>(row[u]);
-    band.x[n + i] = static_cast<float>(u - band.origin_u);
+  float *grey = &band.grey[band.count], *x = &band.x[band.count], *ys = &band.y[band.count];
+  for (int u = from; u <= to; ++u) {
+    *grey++ = static_cast<float>(row[u]);
+    *x++ = static_cast<float>(u - band.origin_u);
+    *ys++ = static_cast<float>(y);
     band.saturated += row[u] == 255 ? 1 : 0;
   }
+  band.count += static_cast<std::size_t>(std::max(0, to - from + 1));
+}
+
+// Room for one more row of the image and a block behind it.
+void make_room(std::size_t row, EllipseBand& band) {
+  const std::size_t wanted = band.count + row + 16;
+  if (band.grey.size() >= wanted) return;
+  for (auto* column : {&band.grey, &band.x, &band.y}) column->resize(2 * wanted);
 }
 
 FlatRing ring_of(const RingSums& s) {
@@ -137,7 +142,7 @@ bool collect_band(const ImageView& image, const Eigen::Vector2d& centre_px, cons
   band.half_width_px = half_width_px;
   band.origin_u = static_cast<int>(std::lround(centre_px.x()));
   band.origin_v = static_cast<int>(std::lround(centre_px.y()));
-  band.grey.clear(), band.x.clear(), band.y.clear();
+  band.count = 0;
   band.saturated = 0;
   std::array<RingSums, EllipseBand::outer_rings + EllipseBand::inner_rings> sums;
   const int first = std::max(0, static_cast<int>(std::ceil(centre_px.y() - all[0].reach_v)));
@@ -146,6 +151,7 @@ bool collect_band(const ImageView& image, const Eigen::Vector2d& centre_px, cons
   for (int v = first; v <= last; ++v) {
     const std::uint8_t* row = image.row(v);
     const int y = v - band.origin_v;
+    make_room(static_cast<std::size_t>(2 * (reach_u + half_width_px)) + 4, band);
     Columns outside = columns_of(all[0], v - centre_px.y(), centre_px.x(), {0, image.width_px - 1});
     for (std::size_t k = 0; k + 1 < bounds; ++k) {
       const Columns inside = columns_of(all[k + 1], v - centre_px.y(), centre_px.x(), outside);

@@ -32,10 +32,14 @@ struct EllipseBand {
   Eigen::Matrix2d shape_px2 = Eigen::Matrix2d::Zero();
   double half_width_px = 0;
   int origin_u = 0, origin_v = 0;
-  std::vector<float> grey, x, y;  // pixels across the outline
+  // Pixels across the outline; readable up to a multiple of 16, what is behind count has no meaning.
+  std::vector<float> grey, x, y;
+  std::size_t count = 0;
   std::array<FlatRing, outer_rings + inner_rings>
       rings;          // outer ones from the outline outwards, then inner ones
   int saturated = 0;  // pixels of the band at 255
+
+  std::size_t size() const { return count; }
 };
 
 // Fills the band (reusing its memory): pixels within half_width_px of the outline

@@ -6,32 +6,14 @@
 #include <cmath>
 #include <optional>
 
+#include "measure/ellipse_model.h"
+
 namespace zeropose {
 namespace {
 
-constexpr int unknowns = 10;
-enum Unknown { cu, cv, p11, p12, p22, blur, background, mark, gx, gy };
-using Unknowns = Eigen::Matrix<double, unknowns, 1>;
-using Information = Eigen::Matrix<double, unknowns, unknowns>;
+using namespace ellipse_model;
 
 constexpr double rounding_variance = 1.0 / 12;
-constexpr double smallest_blur_px = 0.25, largest_blur_px = 4;
-
-// cu cv relative to the band's origin; P = R^2 times the inverse shape, so that its elements are near 1.
-struct State {
-  Unknowns at = Unknowns::Zero();
-  double R2 = 1;
-
-  Eigen::Matrix2d shape() const {
-    Eigen::Matrix2d P;
-    P << at(p11), at(p12), at(p12), at(p22);
-    return R2 * P.inverse();
-  }
-  bool plausible() const {
-    return at.allFinite() && at(p11) > 0 && at(p11) * at(p22) - at(p12) * at(p12) > 1e-4 &&
-           at(blur) > smallest_blur_px && at(blur) < largest_blur_px;
-  }
-};
 
 State state_of(const EllipseStart& start, const EllipseBand& band, double blur_px) {
   State state;
@@ -40,140 +22,6 @@ State state_of(const EllipseStart& start, const EllipseBand& band, double blur_p
   state.at << start.centre_px.x() - band.origin_u, start.centre_px.y() - band.origin_v, P(0, 0), P(0, 1),
       P(1, 1), blur_px, start.background_grey, start.mark_grey, 0, 0;
   return state;
-}
-
-struct Bell {
-  float density, below;  // of the standard normal distribution
-};
-
-// Good to 1e-6 for the density and 1e-5 for the integral (Abramowitz and Stegun 26.2.17); free of branches,
-// so that the compiler turns the loop round it into vector code.
-inline Bell bell(float t) {
-  const float size = std::min(std::abs(t), 5.0F);
-  const float y = size * size * (-0.5F / 32);
-  float e = 1 + y * (1 + y * (1.0F / 2) * (1 + y * (1.0F / 3) * (1 + y * (1.0F / 4) * (1 + y * (1.0F / 5)))));
-  e *= e, e *= e, e *= e, e *= e, e *= e;
-  const float density = 0.398942280F * e, k = 1 / (1 + 0.2316419F * size);
-  const float tail =
-      density * k *
-      (0.319381530F + k * (-0.356563782F + k * (1.781477937F + k * (-1.821255978F + k * 1.330274429F))));
-  return {density, t < 0 ? tail : 1 - tail};
-}
-
-constexpr std::size_t block_size = 16, columns = unknowns + 1;
-
-// Ten derivatives and the residual (last) of some pixels, one row each.
-struct Block {
-  alignas(64) float row[columns][block_size];
-};
-
-// What differentiate() needs of the state, in single precision.
-struct Constants {
-  explicit Constants(const State& state)
-      : u(float(state.at(cu))),
-        v(float(state.at(cv))),
-        r2(float(1 / state.R2)),
-        a(float(state.at(p11)) * r2),
-        b(float(state.at(p12)) * r2),
-        c(float(state.at(p22)) * r2),
-        low(float(state.at(mark))),
-        step(float(state.at(background) - state.at(mark))),
-        inverse_blur(float(1 / state.at(blur))),
-        light_x(float(state.at(gx))),
-        light_y(float(state.at(gy))) {}
-  float u, v, r2, a, b, c, low, step, inverse_blur, light_x, light_y;
-};
-
-void differentiate(const float* __restrict grey, const float* __restrict px, const float* __restrict py,
-                   const Constants k, Block& __restrict out) {
-  for (std::size_t i = 0; i < block_size; ++i) {
-    const float x = px[i] - k.u, y = py[i] - k.v;
-    const float wx = k.a * x + k.b * y, wy = k.b * x + k.c * y;
-    const float q = std::max(x * wx + y * wy, 1e-6F), rho = std::sqrt(q);
-    const float im = 1 / std::sqrt(wx * wx + wy * wy + 1e-12F);
-    const float d = (q - rho) * im;
-    const Bell edge = bell(d * k.inverse_blur);
-    const float light = 1 + k.light_x * px[i] + k.light_y * py[i];
-    const float level = k.low + k.step * edge.below;
-    const float slope = light * k.step * edge.density * k.inverse_blur;
-    const float by_q = slope * im * (1 - 0.5F / rho), by_m = slope * d * im * im;
-    out.row[cu][i] = by_m * (k.a * wx + k.b * wy) - 2 * by_q * wx;
-    out.row[cv][i] = by_m * (k.b * wx + k.c * wy) - 2 * by_q * wy;
-    out.row[p11][i] = (by_q * x - by_m * wx) * x * k.r2;
-    out.row[p12][i] = (2 * by_q * x * y - by_m * (wx * y + wy * x)) * k.r2;
-    out.row[p22][i] = (by_q * y - by_m * wy) * y * k.r2;
-    out.row[blur][i] = -slope * d * k.inverse_blur;
-    out.row[background][i] = light * edge.below;
-    out.row[mark][i] = light * (1 - edge.below);
-    out.row[gx][i] = level * px[i];
-    out.row[gy][i] = level * py[i];
-    out.row[unknowns][i] = grey[i] - light * level;
-  }
-}
-
-// Sums of products of pairs of rows, four partial sums each: the residual's pairs first.
-struct Products {
-  alignas(64) float sum[columns * (columns + 1) / 2][4] = {};
-};
-
-enum class Wanted { all, gradient };
-
-void add_products(const Block& __restrict block, Wanted wanted, Products& __restrict products) {
-  float(*__restrict sum)[4] = products.sum;
-  const std::size_t last = wanted == Wanted::gradient ? unknowns : 0;
-  for (std::size_t i = columns; i-- > last;) {
-    const float* __restrict a = block.row[i];
-    for (std::size_t j = 0; j <= i; ++j, ++sum) {
-      const float* __restrict b = block.row[j];
-      for (std::size_t l = 0; l < 4; ++l) {
-        (*sum)[l] += (a[l] * b[l] + a[l + 4] * b[l + 4]) + (a[l + 8] * b[l + 8] + a[l + 12] * b[l + 12]);
-      }
-    }
-  }
-}
-
-struct Normal {
-  Information N = Information::Zero();
-  Unknowns g = Unknowns::Zero();
-  double squares = 0, count = 0;
-};
-
-// Takes over what was wanted, leaves the rest.
-void unpack(const Products& products, Wanted wanted, Normal& normal) {
-  const auto total = [&products](Eigen::Index pair) {
-    const float* sum = products.sum[pair];
-    return (double{sum[0]} + double{sum[1]}) + (double{sum[2]} + double{sum[3]});
-  };
-  Eigen::Index pair = 0;
-  for (; pair < unknowns; ++pair) normal.g(pair) = total(pair);
-  normal.squares = total(pair++);
-  if (wanted == Wanted::gradient) return;
-  for (Eigen::Index i = unknowns; i-- > 0;) {
-    for (Eigen::Index j = 0; j <= i; ++j, ++pair) normal.N(i, j) = normal.N(j, i) = total(pair);
-  }
-}
-
-void evaluate_edge(const EllipseBand& band, const State& state, Wanted wanted, Normal& normal) {
-  const Constants constants(state);
-  Products products;
-  Block block;
-  const std::size_t n = band.grey.size();
-  std::size_t i = 0;
-  for (; i + block_size <= n; i += block_size) {
-    differentiate(&band.grey[i], &band.x[i], &band.y[i], constants, block);
-    add_products(block, wanted, products);
-  }
-  if (i < n) {
-    std::array<float, block_size> grey{}, x{}, y{};
-    std::copy(band.grey.begin() + std::ptrdiff_t(i), band.grey.end(), grey.begin());
-    std::copy(band.x.begin() + std::ptrdiff_t(i), band.x.end(), x.begin());
-    std::copy(band.y.begin() + std::ptrdiff_t(i), band.y.end(), y.begin());
-    differentiate(grey.data(), x.data(), y.data(), constants, block);
-    for (auto& row : block.row) std::fill(row + (n - i), row + block_size, 0.0F);
-    add_products(block, wanted, products);
-  }
-  unpack(products, wanted, normal);
-  normal.count = double(n);
 }
 
 bool is_outer(std::size_t ring) { return ring < EllipseBand::outer_rings; }
@@ -263,15 +111,26 @@ struct Descent {
   const EllipseBand& band;
   State state;
   Normal normal{};
+  Sectors sectors{};
+  bool sectors_valid = false;
   Taken taken{};
   bool rings_chosen = false;
   double lambda = 0;
   int iterations = 0;
 
   Outcome run();
+  void start_coarsely();
   bool choose_rings(const State& next);
   void try_state(const State& next, Wanted wanted);
 };
+
+// The first step, from the region's outline, can do with half of the pixels.
+void Descent::start_coarsely() {
+  evaluate_edge(band, state, Wanted::all, normal, sectors, 2);
+  State next = state;
+  next.at += step_from(normal, 1e-3);
+  if (next.plausible() && (next.at - state.at).head<2>().norm() < 1) state = next;
+}
 
 bool Descent::choose_rings(const State& next) {
   if (!band_holds(band, next)) return false;
@@ -285,11 +144,14 @@ bool Descent::choose_rings(const State& next) {
 void Descent::try_state(const State& next, Wanted wanted) {
   if (next.plausible()) {
     Normal there = normal;
-    evaluate_edge(band, next, wanted, there);
+    Sectors seen;
+    evaluate_edge(band, next, wanted, there, seen);
     add_rings(band, taken, next, wanted, there);
     if (there.squares <= normal.squares * (1 + 1e-6)) {
       state = next;
       normal = there;
+      sectors = seen;
+      sectors_valid = wanted == Wanted::gradient;
       lambda = lambda > 1e-3 ? lambda * 0.1 : 0;
       return;
     }
@@ -298,7 +160,8 @@ void Descent::try_state(const State& next, Wanted wanted) {
 }
 
 Outcome Descent::run() {
-  evaluate_edge(band, state, Wanted::all, normal);
+  start_coarsely();
+  evaluate_edge(band, state, Wanted::all, normal, sectors);
   for (iterations = 1; iterations < 20 && lambda < 1e6; ++iterations) {
     State next = state;
     const Unknowns step = step_from(normal, lambda);
@@ -331,43 +194,19 @@ double rms_of_rings(const EllipseBand& band, const Taken& taken, const State& st
   return count > 0 ? std::sqrt(std::max(0.0, squares / count)) : 0;
 }
 
-// Displacement of the outline by sector: least squares of the residuals on the slope across the outline.
-struct Sectors {
-  static constexpr std::size_t count = 16;
-  std::array<double, count> rs{}, ss{};
-
-  void add(double x, double y, double slope, double residual) {
-    const double ax = std::abs(x), ay = std::abs(y), low = std::min(ax, ay), high = std::max(ax, ay);
-    const std::size_t octant = (x < 0 ? 1U : 0U) + (y < 0 ? 2U : 0U) + (ax < ay ? 4U : 0U);
-    const std::size_t sector = 2 * octant + (low > 0.4142 * high ? 1U : 0U);  // tan 22.5 deg
-    rs[sector] += residual * slope;
-    ss[sector] += slope * slope;
-  }
-};
-
-Sectors sectors_of(const EllipseBand& band, const State& state) {
-  const Constants constants(state);
-  Block block;
-  Sectors sectors;
-  for (std::size_t i = 0; i + block_size <= band.grey.size(); i += block_size) {
-    differentiate(&band.grey[i], &band.x[i], &band.y[i], constants, block);
-    for (std::size_t k = 0; k < block_size; ++k) {
-      const float du = block.row[cu][k], dv = block.row[cv][k];
-      sectors.add(double{band.x[i + k]} - state.at(cu), double{band.y[i + k]} - state.at(cv),
-                  std::sqrt(double{du * du + dv * dv}), double{block.row[unknowns][k]});
-    }
-  }
-  return sectors;
-}
-
 void judge_outline(const Descent& d, EllipseFit& fit) {
-  const Sectors sectors = sectors_of(d.band, d.state);
+  Sectors sectors = d.sectors;
+  if (!d.sectors_valid) {
+    Normal unused;
+    evaluate_edge(d.band, d.state, Wanted::gradient, unused, sectors);
+  }
   const double noise2 = fit.flat_rms > 0 ? fit.flat_rms * fit.flat_rms : rounding_variance;
   double square = 0, noise_square = 0;
   for (std::size_t k = 0; k < Sectors::count; ++k) {
     if (!(sectors.ss[k] > 0)) continue;
-    square += (sectors.rs[k] / sectors.ss[k]) * (sectors.rs[k] / sectors.ss[k]) / Sectors::count;
-    noise_square += noise2 / sectors.ss[k] / Sectors::count;
+    const double displacement = double{sectors.rs[k]} / double{sectors.ss[k]};
+    square += displacement * displacement / Sectors::count;
+    noise_square += noise2 / double{sectors.ss[k]} / Sectors::count;
   }
   fit.outline_px = std::sqrt(square);
   fit.outline_noise_px = std::sqrt(noise_square);
@@ -389,7 +228,7 @@ EllipseFit report(const Descent& d) {
   fit.background_grey = d.state.at(background) * light;
   fit.blur_px = d.state.at(blur);
   fit.flat_rms = rms_of_rings(band, d.taken, d.state);
-  fit.edge_count = double(band.grey.size());
+  fit.edge_count = double(band.size());
   fit.flat_count = d.normal.count - fit.edge_count;
   const double flat_squares = fit.flat_rms * fit.flat_rms * fit.flat_count;
   fit.edge_rms = std::sqrt(std::max(0.0, d.normal.squares - flat_squares) / fit.edge_count);
@@ -409,7 +248,7 @@ EllipseFit fit_ellipse(const ImageView& image, const EllipseStart& start, Ellips
   for (int round = 0; round < 4; ++round) {
     if (!(from.shape_px2.determinant() > 0) ||
         !collect_band(image, from.centre_px, from.shape_px2, half_width_px, band) ||
-        band.grey.size() < 4 * unknowns) {
+        band.size() < 4 * unknowns) {
       return {};
     }
     Descent descent{band, state_of(from, band, blur_px)};

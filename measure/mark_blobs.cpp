@@ -10,13 +10,14 @@
 namespace zeropose {
 namespace {
 
-// Eight bytes of 0 or 1 to eight bits, the first byte lowest. Arithmetic on the value, so the byte order of
-// the machine matters only in the load.
-std::uint64_t packed(const std::uint8_t* bytes) {
+constexpr std::size_t lead = 8;  // zeros before the pixels of a row, and at least as many behind
+
+// Eight bytes, the first one lowest.
+std::uint64_t eight_at(const std::uint8_t* bytes) {
   std::uint64_t eight = 0;
   std::memcpy(&eight, bytes, 8);
   if constexpr (std::endian::native == std::endian::big) eight = __builtin_bswap64(eight);
-  return (eight * 0x0102040810204080ULL) >> 56;
+  return eight;
 }
 
 }  // namespace
@@ -33,8 +34,8 @@ const std::vector<Blob>& BlobFinder::find(const ImageView& image, const PixelWin
 }
 
 bool BlobFinder::cut_into_runs(const ImageView& image, const PixelWindow& window, int level, bool bright) {
-  const auto width = static_cast<std::size_t>(window.width()), padded = (width + 63) / 64 * 64;
-  row_.assign(padded, 0);
+  const auto width = static_cast<std::size_t>(window.width());
+  row_.assign(lead + (width + 8) / 8 * 8 + 8, 0);
   runs_.clear();
   row_starts_.clear();
   most_runs_ = 200 + width * static_cast<std::size_t>(window.height()) / 24;
@@ -42,37 +43,32 @@ bool BlobFinder::cut_into_runs(const ImageView& image, const PixelWindow& window
   const std::uint8_t flip = bright ? 1 : 0;
   for (int v = window.v0; v <= window.v1; ++v) {
     const std::uint8_t* pixels = image.row(v) + window.u0;
-    std::uint8_t* __restrict out = row_.data();
+    std::uint8_t* __restrict out = row_.data() + lead;
     for (std::size_t i = 0; i < width; ++i) {
       out[i] = static_cast<std::uint8_t>((pixels[i] < threshold ? 1 : 0) ^ flip);
     }
     row_starts_.push_back(runs_.size());
-    if (!runs_of_row(v, window.u0, window.width())) return false;
+    if (!runs_of_row(v, window.u0, width)) return false;
   }
   row_starts_.push_back(runs_.size());
   return true;
 }
 
-// Bits that differ from the one before are where runs start and end.
-bool BlobFinder::runs_of_row(int v, int u0, int width) {
-  std::uint64_t before = 0;
+// Runs start and end where a byte differs from the one before; the zeros round the row close the outer ones.
+bool BlobFinder::runs_of_row(int v, int u0, std::size_t width) {
   int start = -1;
-  for (std::size_t word = 0; word * 64 < row_.size(); ++word) {
-    std::uint64_t bits = 0;
-    for (std::size_t k = 0; k < 8; ++k) bits |= packed(&row_[word * 64 + k * 8]) << (8 * k);
-    std::uint64_t turns = bits ^ (bits << 1 | before);
-    before = bits >> 63;
+  for (std::size_t i = lead; i <= lead + width; i += 8) {
+    std::uint64_t turns = eight_at(&row_[i]) ^ eight_at(&row_[i - 1]);
     for (; turns != 0; turns &= turns - 1) {
-      const int at = static_cast<int>(word * 64) + std::countr_zero(turns);
+      const int at = u0 + static_cast<int>(i - lead) + std::countr_zero(turns) / 8;
       if (start < 0) {
         start = at;
       } else {
-        runs_.push_back({u0 + start, u0 + at - 1, v, -1});
+        runs_.push_back({start, at - 1, v, -1});
         start = -1;
       }
     }
   }
-  if (start >= 0) runs_.push_back({u0 + start, u0 + width - 1, v, -1});
   return runs_.size() <= most_runs_;
 }
 

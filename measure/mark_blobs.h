@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -57,7 +58,7 @@ class BlobFinder {
   };
 
   bool cut_into_runs(const ImageView& image, const PixelWindow& window, int level, bool bright);
-  bool runs_of_row(int v, int u0, int width);
+  bool runs_of_row(int v, int u0, std::size_t width);
   void join_runs();
   int root_of(int region);
   void select(const PixelWindow& window, const BlobLimits& limits);

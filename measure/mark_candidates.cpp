@@ -9,8 +9,8 @@
 namespace zeropose {
 namespace {
 
-constexpr int coarsest_step = 14, finest_step = 4;  // grey levels
-constexpr double size_margin_px = 2;                // the region at one level against the fitted outline
+constexpr double coarsest_step = 24, finest_step = 3;  // grey levels
+constexpr double size_margin_px = 2;                   // the region at one level against the fitted outline
 
 struct GreyRange {
   int low = 0, high = 0;
@@ -91,22 +91,34 @@ int telling(MarkStatus status) {
 
 }  // namespace
 
-CandidateSearch CandidateFinder::find(const ImageView& image, const PixelWindow& window,
-                                      const MarkSearch& search) {
+CandidateSearch CandidateFinder::first(const ImageView& image, const PixelWindow& window,
+                                       const MarkSearch& search) {
   groups_.clear();
   reason_ = MarkStatus::no_candidate;
   const GreyRange range = range_of(image, window, search);
-  if (range.high - range.low < search.min_contrast) return {{}, MarkStatus::low_contrast};
-  CandidateSearch result;
-  double step = (range.high - range.low) / std::ceil((range.high - range.low) / double{coarsest_step});
-  double first = range.low + step / 2;
-  for (;; first = range.low + step / 4, step /= 2) {
-    for (double level = first; level < range.high; level += step) {
-      look_at_level(image, window, search, static_cast<int>(std::lround(level)));
-    }
-    result = judge(image, search);
-    if (!result.candidates.empty() || step < 2 * finest_step) return result;
+  low_ = range.low;
+  high_ = range.high;
+  step_ = 0;
+  if (high_ - low_ < search.min_contrast) return {{}, MarkStatus::low_contrast, 0};
+  step_ = (high_ - low_) / std::ceil((high_ - low_) / coarsest_step);
+  return look(image, window, search, low_ + step_ / 2);
+}
+
+std::optional<CandidateSearch> CandidateFinder::finer(const ImageView& image, const PixelWindow& window,
+                                                      const MarkSearch& search) {
+  if (step_ < 2 * finest_step) return std::nullopt;
+  step_ /= 2;
+  return look(image, window, search, low_ + step_ / 2);
+}
+
+CandidateSearch CandidateFinder::look(const ImageView& image, const PixelWindow& window,
+                                      const MarkSearch& search, double first_level) {
+  for (double level = first_level; level < high_; level += step_) {
+    look_at_level(image, window, search, static_cast<int>(std::lround(level)));
   }
+  CandidateSearch result = judge(image, search);
+  result.step_grey = step_;
+  return result;
 }
 
 void CandidateFinder::look_at_level(const ImageView& image, const PixelWindow& window,
@@ -153,7 +165,7 @@ void CandidateFinder::add(const Sighting& sighting) {
 }
 
 CandidateSearch CandidateFinder::judge(const ImageView& image, const MarkSearch& search) {
-  CandidateSearch result{{}, reason_};
+  CandidateSearch result{{}, reason_, 0};
   const double sign = search.kind == MarkKind::bright_disc ? -1 : 1;
   for (Group& group : groups_) {
     std::sort(group.begin(), group.end(),

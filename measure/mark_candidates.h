@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 #include "measure/ellipse_fit.h"
@@ -17,15 +18,21 @@ struct MarkCandidate {
 };
 
 struct CandidateSearch {
-  std::vector<MarkCandidate> candidates;
+  std::vector<MarkCandidate> candidates;         // the highest contrast first
   MarkStatus reason = MarkStatus::no_candidate;  // when there are none: what came nearest to a mark
+  double step_grey = 0;                          // things of less contrast may have been overlooked
 };
 
+// Looks at grey levels step by step through the range of a window.
 class CandidateFinder {
  public:
-  // Looks at grey levels step by step through the range of the window; a finer step only where the coarser
-  // one found nothing. Precondition: the window lies in the image.
-  CandidateSearch find(const ImageView& image, const PixelWindow& window, const MarkSearch& search);
+  // At a coarse step. Precondition: the window lies in the image.
+  CandidateSearch first(const ImageView& image, const PixelWindow& window, const MarkSearch& search);
+
+  // At half the step of the call before, in the same window; all that was seen up to then. Nothing when that
+  // would be finer than makes sense.
+  std::optional<CandidateSearch> finer(const ImageView& image, const PixelWindow& window,
+                                       const MarkSearch& search);
 
  private:
   struct Sighting {
@@ -36,6 +43,8 @@ class CandidateFinder {
   };
   using Group = std::vector<Sighting>;
 
+  CandidateSearch look(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                       double first_level);
   void look_at_level(const ImageView& image, const PixelWindow& window, const MarkSearch& search, int level);
   void add(const Sighting& sighting);
   CandidateSearch judge(const ImageView& image, const MarkSearch& search);
@@ -43,6 +52,7 @@ class CandidateFinder {
   BlobFinder blobs_;
   std::vector<Group> groups_;
   MarkStatus reason_ = MarkStatus::no_candidate;
+  double low_ = 0, high_ = 0, step_ = 0;
 };
 
 }  // namespace zeropose

@@ -137,6 +137,29 @@ struct Workspace {
   EllipseWorkspace ellipse;
 };
 
+// The best of the candidates, ambiguous if another one stands beside it, or the most telling reason.
+MarkFinding best_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
+                    EllipseWorkspace& workspace) {
+  MarkFinding best = with_status(seen.reason);
+  for (std::size_t k = 0; k < std::min(most_candidates, seen.candidates.size()); ++k) {
+    const MarkFinding finding = judged(image, search, seen.candidates[k].start, workspace);
+    if (!stands(best)) {
+      if (stands(finding) || telling(finding.status) >= telling(best.status)) best = finding;
+    } else if (stands(finding) && !same_place(finding, best) &&
+               std::min(finding.contrast, best.contrast) >
+                   rival_contrast * std::max(finding.contrast, best.contrast)) {
+      return with_status(MarkStatus::ambiguous);
+    }
+  }
+  return best;
+}
+
+// Levels so far apart that a rival could slip through call for a closer look.
+bool decided(const MarkFinding& finding, const CandidateSearch& seen) {
+  return finding.status == MarkStatus::ambiguous ||
+         (stands(finding) && seen.step_grey < 0.75 * rival_contrast * finding.contrast);
+}
+
 MarkFinding find_mark(const ImageView& image, const MarkSearch& search, Workspace& workspace) {
   if (image.data == nullptr || image.width_px < 2 || image.height_px < 2) {
     return with_status(MarkStatus::outside_image);
@@ -144,20 +167,12 @@ MarkFinding find_mark(const ImageView& image, const MarkSearch& search, Workspac
   if (!makes_sense(image, search)) return {};
   const PixelWindow window = window_of(image, search);
   if (window.empty()) return with_status(MarkStatus::outside_image);
-  const CandidateSearch seen = workspace.candidates.find(image, window, search);
-  MarkFinding best = with_status(seen.reason);
-  bool any = false;
-  for (std::size_t k = 0; k < std::min(most_candidates, seen.candidates.size()); ++k) {
-    const MarkFinding finding = judged(image, search, seen.candidates[k].start, workspace.ellipse);
-    if (!stands(finding)) {
-      if (!any && telling(finding.status) >= telling(best.status)) best = with_status(finding.status);
-    } else if (!any) {
-      best = finding;
-      any = true;
-    } else if (!same_place(finding, best) && std::min(finding.contrast, best.contrast) >
-                                                 rival_contrast * std::max(finding.contrast, best.contrast)) {
-      return with_status(MarkStatus::ambiguous);
-    }
+  std::optional<CandidateSearch> seen = workspace.candidates.first(image, window, search);
+  MarkFinding best;
+  while (seen) {
+    best = best_of(image, search, *seen, workspace.ellipse);
+    if (decided(best, *seen)) break;
+    seen = workspace.candidates.finer(image, window, search);
   }
   return best.status == MarkStatus::found ? best : with_status(best.status);
 }

@@ -1,0 +1,146 @@
+#include "measure/ellipse_model.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace zeropose::ellipse_model {
+namespace {
+
+struct Bell {
+  float density, below;  // of the standard normal distribution
+};
+
+// Good to 1e-6 for the density and 1e-5 for the integral (Abramowitz and Stegun 26.2.17); free of branches,
+// so that the compiler turns the loop round it into vector code.
+inline Bell bell(float t) {
+  const float size = std::min(std::abs(t), 5.0F);
+  const float y = size * size * (-0.5F / 32);
+  float e = 1 + y * (1 + y * (1.0F / 2) * (1 + y * (1.0F / 3) * (1 + y * (1.0F / 4) * (1 + y * (1.0F / 5)))));
+  e *= e, e *= e, e *= e, e *= e, e *= e;
+  const float density = 0.398942280F * e, k = 1 / (1 + 0.2316419F * size);
+  const float tail =
+      density * k *
+      (0.319381530F + k * (-0.356563782F + k * (1.781477937F + k * (-1.821255978F + k * 1.330274429F))));
+  return {density, t < 0 ? tail : 1 - tail};
+}
+
+constexpr std::size_t block_size = 16, columns = unknowns + 1;
+
+// Ten derivatives and the residual (last) of some pixels, one row each.
+struct Block {
+  alignas(64) float row[columns][block_size];
+};
+
+// What differentiate() needs of the state, in single precision.
+struct Constants {
+  explicit Constants(const State& state)
+      : u(float(state.at(cu))),
+        v(float(state.at(cv))),
+        r2(float(1 / state.R2)),
+        a(float(state.at(p11)) * r2),
+        b(float(state.at(p12)) * r2),
+        c(float(state.at(p22)) * r2),
+        low(float(state.at(mark))),
+        step(float(state.at(background) - state.at(mark))),
+        inverse_blur(float(1 / state.at(blur))),
+        light_x(float(state.at(gx))),
+        light_y(float(state.at(gy))) {}
+  float u, v, r2, a, b, c, low, step, inverse_blur, light_x, light_y;
+};
+
+void differentiate(const float* __restrict grey, const float* __restrict px, const float* __restrict py,
+                   const Constants k, Block& __restrict out) {
+  for (std::size_t i = 0; i < block_size; ++i) {
+    const float x = px[i] - k.u, y = py[i] - k.v;
+    const float wx = k.a * x + k.b * y, wy = k.b * x + k.c * y;
+    const float q = std::max(x * wx + y * wy, 1e-6F), rho = std::sqrt(q);
+    const float im = 1 / std::sqrt(wx * wx + wy * wy + 1e-12F);
+    const float d = (q - rho) * im;
+    const Bell edge = bell(d * k.inverse_blur);
+    const float light = 1 + k.light_x * px[i] + k.light_y * py[i];
+    const float level = k.low + k.step * edge.below;
+    const float slope = light * k.step * edge.density * k.inverse_blur;
+    const float by_q = slope * im * (1 - 0.5F / rho), by_m = slope * d * im * im;
+    out.row[cu][i] = by_m * (k.a * wx + k.b * wy) - 2 * by_q * wx;
+    out.row[cv][i] = by_m * (k.b * wx + k.c * wy) - 2 * by_q * wy;
+    out.row[p11][i] = (by_q * x - by_m * wx) * x * k.r2;
+    out.row[p12][i] = (2 * by_q * x * y - by_m * (wx * y + wy * x)) * k.r2;
+    out.row[p22][i] = (by_q * y - by_m * wy) * y * k.r2;
+    out.row[blur][i] = -slope * d * k.inverse_blur;
+    out.row[background][i] = light * edge.below;
+    out.row[mark][i] = light * (1 - edge.below);
+    out.row[gx][i] = level * px[i];
+    out.row[gy][i] = level * py[i];
+    out.row[unknowns][i] = grey[i] - light * level;
+  }
+}
+
+// Sums of products of pairs of rows, four partial sums each: the residual's pairs first.
+struct Products {
+  alignas(64) float sum[columns * (columns + 1) / 2][4] = {};
+};
+
+void add_products(const Block& __restrict block, Wanted wanted, Products& __restrict products) {
+  float(*__restrict sum)[4] = products.sum;
+  const std::size_t last = wanted == Wanted::gradient ? unknowns : 0;
+  for (std::size_t i = columns; i-- > last;) {
+    const float* __restrict a = block.row[i];
+    for (std::size_t j = 0; j <= i; ++j, ++sum) {
+      const float* __restrict b = block.row[j];
+      for (std::size_t l = 0; l < 4; ++l) {
+        (*sum)[l] += (a[l] * b[l] + a[l + 4] * b[l + 4]) + (a[l + 8] * b[l + 8] + a[l + 12] * b[l + 12]);
+      }
+    }
+  }
+}
+
+// Takes over what was wanted, leaves the rest.
+void unpack(const Products& products, Wanted wanted, Normal& normal) {
+  const auto total = [&products](Eigen::Index pair) {
+    const float* sum = products.sum[pair];
+    return (double{sum[0]} + double{sum[1]}) + (double{sum[2]} + double{sum[3]});
+  };
+  Eigen::Index pair = 0;
+  for (; pair < unknowns; ++pair) normal.g(pair) = total(pair);
+  normal.squares = total(pair++);
+  if (wanted == Wanted::gradient) return;
+  for (Eigen::Index i = unknowns; i-- > 0;) {
+    for (Eigen::Index j = 0; j <= i; ++j, ++pair) normal.N(i, j) = normal.N(j, i) = total(pair);
+  }
+}
+
+void add_sectors(const Block& block, const float* px, const float* py, const Constants& k, std::size_t n,
+                 Sectors& sectors) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const float x = px[i] - k.u, y = py[i] - k.v, ax = std::abs(x), ay = std::abs(y);
+    const std::size_t octant = (x < 0 ? 1U : 0U) + (y < 0 ? 2U : 0U) + (ax < ay ? 4U : 0U);
+    const bool upper = std::min(ax, ay) > 0.4142F * std::max(ax, ay);  // tan 22.5 deg
+    const float du = block.row[cu][i], dv = block.row[cv][i], square = du * du + dv * dv;
+    sectors.rs[2 * octant + upper] += block.row[unknowns][i] * std::sqrt(square);
+    sectors.ss[2 * octant + upper] += square;
+  }
+}
+
+}  // namespace
+
+void evaluate_edge(const EllipseBand& band, const State& state, Wanted wanted, Normal& normal,
+                   Sectors& sectors, std::size_t stride) {
+  const Constants constants(state);
+  Products products;
+  Block block;
+  sectors = {};
+  const std::size_t n = band.size();
+  for (std::size_t i = 0; i < n; i += stride * block_size) {
+    differentiate(&band.grey[i], &band.x[i], &band.y[i], constants, block);
+    const std::size_t valid = std::min(block_size, n - i);
+    if (valid < block_size) {
+      for (auto& row : block.row) std::fill(row + valid, row + block_size, 0.0F);
+    }
+    add_products(block, wanted, products);
+    if (wanted == Wanted::gradient) add_sectors(block, &band.x[i], &band.y[i], constants, valid, sectors);
+  }
+  unpack(products, wanted, normal);
+  normal.count = double(n);
+}
+
+}  // namespace zeropose::ellipse_model
