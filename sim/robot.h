@@ -76,6 +76,7 @@ class SimulatedRobot {
   RobotAnswer heartbeat();
   RobotAnswer read();  // just looks at the block
   void disconnect();
+  std::uint32_t next_request_id() const { return next_id_; }
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -26,6 +26,15 @@ SimulatedRobotOptions robot_options() {
   return options;
 }
 
+RecorderOptions recorder_options() {
+  RecorderOptions options;
+  options.convention = Convention::kuka;
+  return options;
+}
+
+// Of the robot in the cell file. The nominal pose, where the zero is taken, is the identity.
+Pose robot_in_world() { return from_six_numbers({1200, -2400, -150, 0, 0, 90}); }
+
 }  // namespace
 
 TemporaryFolder::TemporaryFolder() {
@@ -37,7 +46,10 @@ TemporaryFolder::TemporaryFolder() {
 TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
 
 WalkingLine::WalkingLine(std::filesystem::path cell)
-    : cell_(std::move(cell)), notify_(folder_ / "notify.sock"), robot_(robot_options()) {}
+    : cell_(std::move(cell)),
+      notify_(folder_ / "notify.sock"),
+      robot_(robot_options()),
+      recorder_(recorder_options()) {}
 
 void WalkingLine::start_cell() {
   cell_process =
@@ -59,6 +71,8 @@ void WalkingLine::start_daemon() {
                                "WATCHDOG_USEC=2000000"});
   if (!notify_.heard("READY=1", start_patience))
     throw std::runtime_error("the daemon is not READY:\n" + daemon_log());
+  if (!watched_) recorder_.watch("127.0.0.1", 1502);
+  watched_ = true;
 }
 
 int WalkingLine::stop_daemon() {
@@ -79,6 +93,24 @@ void WalkingLine::take_zero() {
   if (zero.status != 0) throw std::runtime_error("no zero: " + zero.out + zero.err);
 }
 
+RobotAnswer WalkingLine::measure() {
+  const std::uint32_t id = robot_.next_request_id();
+  const Pose X_WR = robot_in_world();
+  recorder_.requested(id);
+  // The error of the rotation moves the robot's origin, which is 2.7 m away from the object's.
+  recorder_.truth(id, X_WR.inverse() * X_WO_ * X_WR,
+                  line_error_mm + X_WR.translation().norm() * line_error_deg / degrees_per_radian,
+                  2 * line_error_deg);
+  return robot_.measure(1, id);
+}
+
+RobotAnswer WalkingLine::acknowledge() {
+  const std::uint32_t id = robot_.next_request_id() - 1;
+  const RobotAnswer answer = robot_.acknowledge();
+  if (answer.ok()) recorder_.withdrawn(id);
+  return answer;
+}
+
 Json WalkingLine::ask_cell(const Json& question) const {
   const Json answer = Json::parse(ask(folder_ / "cell.sock", question.dump(), 30s));
   if (answer.value("status", "") != "ok") throw std::runtime_error("the cell says " + answer.dump());
@@ -90,6 +122,7 @@ Json WalkingLine::ask_daemon(const Json& question) const {
 }
 
 void WalkingLine::shift(const Pose& X_WO) {
+  X_WO_ = X_WO;
   const SixNumbers s = to_six_numbers(X_WO);
   ask_cell({{"cmd", "shift"}, {"pose", {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg}}});
 }

@@ -9,8 +9,12 @@
 
 #include "sim/robot.h"
 #include "tests/support/process.h"
+#include "tests/support/recorder.h"
 
 namespace zeropose {
+
+// Of each car with the wrong calibration of seed 1.
+inline constexpr double line_error_mm = 0.4, line_error_deg = 0.012;
 
 // A folder that goes with its owner.
 class TemporaryFolder {
@@ -45,6 +49,11 @@ class WalkingLine {
   Finished zeropose(std::vector<std::string> arguments) const;
 
   SimulatedRobot& robot() { return robot_; }
+  // The robot's Measure and Acknowledge, told to the recorder with the truth.
+  RobotAnswer measure();
+  RobotAnswer acknowledge();
+  // Watches from the first start of the daemon.
+  Recorder& recorder() { return recorder_; }
   // The robot-base shift that the robot was sent, as X_O0O.
   Pose shift_from(const Pose& D_R) const;
   const std::filesystem::path& cell_file() const { return cell_; }
@@ -60,6 +69,9 @@ class WalkingLine {
   std::filesystem::path cell_;
   NotifyListener notify_;
   SimulatedRobot robot_;
+  Recorder recorder_;
+  bool watched_ = false;
+  Pose X_WO_ = Pose::Identity();  // where the object stands
 };
 
 }  // namespace zeropose

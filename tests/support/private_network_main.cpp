@@ -1,4 +1,4 @@
-// These tests serve GigE Vision cameras on loopback, inside a network of their own.
+// main() of tests that serve GigE Vision cameras on loopback: inside a network of their own.
 #include <gtest/gtest.h>
 
 #include <cstdio>
