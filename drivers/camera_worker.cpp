@@ -160,6 +160,7 @@ std::unique_ptr<Camera> CameraWorker::open() {
   std::unique_ptr<Camera> camera = open_(camera_);
   camera->start();
   const std::lock_guard lock(mutex_);
+  if (!tried_) last_problem_.clear();
   open_now_ = tried_ = true;
   call_due_ = TimePoint::max();
   timeouts_ = 0;
