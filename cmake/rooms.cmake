@@ -8,6 +8,10 @@ if(ZEROPOSE_SANITIZE)
   target_compile_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE} -fno-sanitize-recover=all
                          -fno-omit-frame-pointer)
   target_link_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE})
+  if(ZEROPOSE_SANITIZE MATCHES undefined)
+    # These make files that use Eigen or JSON four times slower to compile; AddressSanitizer finds what they would.
+    target_compile_options(zeropose_flags INTERFACE -fno-sanitize=null,alignment,object-size,vptr)
+  endif()
 endif()
 
 # zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME.
