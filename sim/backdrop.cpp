@@ -100,7 +100,7 @@ std::vector<Thing> plate_things(double radius_mm, double grey, Random& random) {
     return things;
   }
   things.push_back({rounded_box(Vector2d::Zero(), angle, half, random.uniform(3, 12)), metal});
-  const Shape& plate = things.front().shape;
+  const Shape plate = things.front().shape;
   const Vector2d across(-plate.axis.y(), plate.axis.x());
   for (const double side : {-1.0, 1.0}) {
     const Vector2d corner = side * ((half.x() - 7) * plate.axis + (half.y() - 7) * across);

@@ -87,8 +87,8 @@ double rim_grey(const Thing& thing, const Vector2d& q_mm, double distance_mm) {
 double grey_of(const Thing& thing, const Vector2d& q_mm, double distance_mm) {
   const Paint& paint = thing.paint;
   double grey = paint.grey + rim_grey(thing, q_mm, distance_mm);
-  if (paint.texture_grey > 0) grey += paint.texture_grey * value_noise(q_mm / paint.texture_mm);
-  if (paint.shading_grey > 0) grey += paint.shading_grey * value_noise(q_mm / 140);
+  if (paint.texture_grey > 0) grey += paint.texture_grey * value_noise(q_mm * (1 / paint.texture_mm));
+  if (paint.shading_grey > 0) grey += paint.shading_grey * value_noise(q_mm * (1.0 / 140));
   return grey;
 }
 
@@ -160,8 +160,9 @@ void Painter::paint(const Thing& thing, const Pose& X_CS) {
         u += steps_within(distance - edge_mm, mm_per_px);
         continue;
       }
-      known_deep = known_deep > 0 ? known_deep - 1 : steps_within(-distance - deep_mm, mm_per_px);
-      const double share = thing.paint.opacity * blurred_step(distance / sigma_mm);
+      const bool deep = known_deep > 0;
+      known_deep = deep ? known_deep - 1 : steps_within(-distance - deep_mm, mm_per_px);
+      const double share = thing.paint.opacity * (deep ? 1 : blurred_step(distance / sigma_mm));
       row[u] += static_cast<float>(share * (grey_of(thing, q, distance) - row[u]));
     }
   }

@@ -109,10 +109,7 @@ std::vector<Picture> all_pictures(const Scene& scene, const Pose& X_WO, const Fa
 }
 
 // Extremes of the range of poses that cars come in.
-const std::vector<SixNumbers> extremes{{30, 30, 30, 0.2, 0.2, 0.2},
-                                       {-30, -30, -30, -0.2, -0.2, -0.2},
-                                       {30, -30, -30, -0.2, 0.2, -0.2},
-                                       {-30, 30, 30, 0.2, -0.2, 0.2}};
+const std::vector<SixNumbers> extremes{{30, 30, 30, 0.2, 0.2, 0.2}, {-30, -30, -30, -0.2, -0.2, -0.2}};
 
 TEST(Renderer, MovesTheMarksAsProjected) {
   const Scene scene = test::flat_car_body();
@@ -227,15 +224,18 @@ TEST(Renderer, MarksSitOnEvenSurfaces) {
 TEST(Renderer, ACoveredMarkIsGoneAndNothingElseChanges) {
   const Scene scene = test::car_body();
   const Pose X_WO = from_six_numbers({5, 6, -7, 0, 0, 0.1});
-  const auto seen = all_pictures(scene, X_WO), covered = all_pictures(scene, X_WO, {{"camera2/2"}, {}});
+  const CameraRenderer renderer(scene, 1);
+  const Picture seen = renderer.clean_picture(X_WO),
+                covered = renderer.clean_picture(X_WO, {{"camera2/2"}, {}});
   for (const View& view : scene.views) {
+    if (view.camera != 1) continue;
     const Mark& mark = mark_of(scene, view);
-    const Outline outline = outline_of(scene.cameras[view.camera], mark, X_WO);
+    const Outline outline = outline_of(scene.cameras[1], mark, X_WO);
     float darkest = 1000, change = 0;
     for_pixels_round(model_of(scene, view), outline.centroid, outline.radius_px,
                      [&](std::size_t i, const Vector2d&) {
-                       darkest = std::min(darkest, covered[view.camera][i]);
-                       change = std::max(change, std::abs(covered[view.camera][i] - seen[view.camera][i]));
+                       darkest = std::min(darkest, covered[i]);
+                       change = std::max(change, std::abs(covered[i] - seen[i]));
                      });
     if (mark.name == "camera2/2") {
       EXPECT_GT(darkest, 130) << "something of the mark shows";
@@ -248,14 +248,16 @@ TEST(Renderer, ACoveredMarkIsGoneAndNothingElseChanges) {
 TEST(Renderer, ADisplacedMarkSitsThatFarToTheRight) {
   const Scene scene = test::flat_car_body();
   const Pose X_WO = from_six_numbers({-3, 8, 2, 0, 0.1, 0});
+  const CameraRenderer renderer(scene, 2);
   for (const double displaced_px : {20.0, -7.5}) {
-    const auto pictures = all_pictures(scene, X_WO, {{}, {{"camera3/2", displaced_px}}});
+    const Picture picture = renderer.clean_picture(X_WO, {{}, {{"camera3/2", displaced_px}}});
     for (const View& view : scene.views) {
+      if (view.camera != 2) continue;
       const Mark& mark = mark_of(scene, view);
-      const Outline outline = outline_of(scene.cameras[view.camera], mark, X_WO);
+      const Outline outline = outline_of(scene.cameras[2], mark, X_WO);
       const Vector2d off(mark.name == "camera3/2" ? displaced_px : 0, 0);
-      const Vector2d found = darkness_centroid(model_of(scene, view), pictures[view.camera],
-                                               outline.centroid + off, outline.radius_px);
+      const Vector2d found =
+          darkness_centroid(model_of(scene, view), picture, outline.centroid + off, outline.radius_px);
       // The eccentricity of an ellipse changes a little with its place.
       EXPECT_LT((found - outline.centroid - off).norm(), 0.01) << mark.name;
     }
