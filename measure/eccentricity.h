@@ -18,8 +18,8 @@ namespace zeropose {
 // The perspective part is exact: the outline is the conic with the dual r^2 (I - n n^T) - p p^T. The lens
 // bends that ellipse; its best fitting ellipse (least squares of distances along the normals, weights by arc
 // length, as for an edge of constant contrast) follows from the second derivative of the lens at the centre.
-// Neglected: fourth order of the lens across the disc, below 1e-3 px for marks of up to 80 px and |K| up
-// to 1.1.
+// Neglected: fourth order of the lens across the disc, below 1e-4 px for discs of 20 mm radius at 3 m and |K|
+// up to 1.1.
 Eigen::Vector2d ellipse_centre_offset(const CameraModel& camera, const Eigen::Vector3d& p_CM_mm,
                                       const Eigen::Vector3d& normal_C, double radius_mm);
 

@@ -68,7 +68,7 @@ Taken flat_rings(const EllipseBand& band, const State& state) {
   }
   const double contrast = std::abs(state.at(background) - state.at(mark));
   const double most = 2.5 * quietest + rounding_variance + 1e-4 * contrast * contrast;
-  const double room = 0.05 * contrast + 2 * std::sqrt(quietest) / 4 + 0.5;
+  const double room = 0.05 * contrast + 0.5 * std::sqrt(quietest) + 0.5;
   for (std::size_t k = 0; k < taken.size(); ++k) {
     const bool first = k == 0 || k == EllipseBand::outer_rings;
     taken[k] = taken[k] && variance[k] <= most && (first || taken[k - 1]) &&

@@ -49,7 +49,12 @@ struct MarkFinding {
   double quality = 0;      // 0..1: how well the model explains the pixels
 };
 
-// Findings in the order of the searches. Pure and repeatable bit by bit.
+// Findings in the order of the searches. Pure and repeatable bit by bit. A mark may be up to 2.5 px + its
+// blur near the image's border and must lie in its window as a whole; its surroundings should be of one
+// surface for 3.5 px round it. Two things in one window that both pass for the mark are ambiguous unless one
+// has less than 0.4 of the other's contrast. A search that makes no sense (not finite, limits the wrong way
+// round) is not_searched, an empty image or a window beside the image outside_image. Saturated: at 255; a
+// mark at 0 is measured.
 std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const MarkSearch> searches);
 
 }  // namespace zeropose

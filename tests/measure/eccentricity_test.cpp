@@ -105,7 +105,7 @@ TEST(Eccentricity, AgreesWithFittedOutlines) {
       const Scene s = random_scene(random, camera, pi / 3);
       const Vector2d want = fitted_centre(outline_px(camera, s.p, s.n, s.r)) - project(camera, s.p).value();
       const Vector2d got = ellipse_centre_offset(camera, s.p, s.n, s.r);
-      EXPECT_LT((got - want).norm(), 1e-3) << got.transpose() << " for " << want.transpose();
+      EXPECT_LT((got - want).norm(), 1e-4) << got.transpose() << " for " << want.transpose();
     }
   }
 }

@@ -3,6 +3,8 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "measure/marks.h"
 #include "tests/support/mark_picture.h"
@@ -51,6 +53,27 @@ TEST(MarksInClutter, NothingIsTakenForACoveredMark) {
     with_structure += finding.status != MarkStatus::low_contrast ? 1 : 0;
   }
   EXPECT_GT(with_structure, 500);
+}
+
+// Bolts: hexagons of a mark's size, down to the contrast that a mark needs.
+TEST(MarksInClutter, HexagonsAreNotDiscs) {
+  std::mt19937_64 random(23);
+  std::uniform_real_distribution<double> unit(0, 1);
+  for (int seed = 0; seed < 200; ++seed) {
+    Window window = window_of(1, random);
+    const double radius = 10 + 18 * unit(random), turn = unit(random);
+    const double contrast = seed % 2 == 0 ? 16 : 16 + 60 * unit(random);
+    window.drawing.figures.push_back({});
+    window.drawing.figures[0].grey = window.drawing.background - contrast;
+    for (int k = 0; k < 6; ++k) {
+      const double angle = turn + k * std::numbers::pi / 3;
+      window.drawing.figures[0].corners_px.push_back(middle +
+                                                     radius * Vector2d(std::cos(angle), std::sin(angle)));
+    }
+    const auto pixels = expose(paint(window.drawing), 2, random);
+    const MarkFinding finding = find_marks(pixels.view(), {&window.search, 1}).front();
+    EXPECT_NE(finding.status, MarkStatus::found) << radius << " px, contrast " << contrast;
+  }
 }
 
 // Found at the right place and nowhere else; a clutter that makes it doubtful may say so, rarely.
