@@ -37,24 +37,26 @@ bool valid(const Eigen::Matrix2d& covariance) {
          std::abs(covariance(0, 1) - covariance(1, 0)) <= 1e-9 * covariance.trace();
 }
 
+// What is wrong with an observation's numbers, or nothing.
+std::string fault_of(const PoseProblem& problem, const Observation& observation) {
+  if (observation.camera >= problem.cameras.size()) return "names a camera that does not exist";
+  if (observation.mark >= problem.marks.size()) return "names a mark that does not exist";
+  if (!observation.u_px.allFinite()) return "has a pixel that is not finite";
+  if (!valid(observation.covariance_px2)) return "has a covariance that is not positive definite";
+  if (!valid(problem.cameras[observation.camera]))
+    return "comes from a camera whose calibration is not usable";
+  if (!valid(problem.marks[observation.mark])) return "belongs to a mark whose numbers are not usable";
+  return {};
+}
+
 // What is wrong with the numbers of the problem, or nothing.
 std::string fault_of(const PoseProblem& problem) {
   if (!is_number_not_below_zero(problem.system_sigma_px)) return "the system's sigma is not a number >= 0";
   for (const auto* pose : {&problem.X_WO_start, &problem.X_WP_planar})
     if (*pose && !(*pose)->matrix().allFinite()) return "a given pose is not finite";
-  for (std::size_t i = 0; i < problem.observations.size(); ++i) {
-    const Observation& observation = problem.observations[i];
-    const std::string which = "observation " + number(i + 1);
-    if (observation.camera >= problem.cameras.size()) return which + " names a camera that does not exist";
-    if (observation.mark >= problem.marks.size()) return which + " names a mark that does not exist";
-    if (!observation.u_px.allFinite()) return which + " has a pixel that is not finite";
-    if (!valid(observation.covariance_px2)) return which + " has a covariance that is not positive definite";
-    if (!valid(problem.cameras[observation.camera]))
-      return "camera " + problem.cameras[observation.camera].name +
-             " has internals or a pose that are not usable";
-    if (!valid(problem.marks[observation.mark]))
-      return "mark " + problem.marks[observation.mark].name + " has numbers that are not usable";
-  }
+  for (std::size_t i = 0; i < problem.observations.size(); ++i)
+    if (const std::string fault = fault_of(problem, problem.observations[i]); !fault.empty())
+      return "observation " + number(i + 1) + " (from 1) " + fault;
   return {};
 }
 

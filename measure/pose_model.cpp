@@ -23,11 +23,18 @@ namespace {
 // W with W' W = P.
 Matrix2d whitening_of(const Matrix2d& P) {
   Matrix2d W = Matrix2d::Zero();
-  if (!(P(0, 0) > 0)) return W;
   W(0, 0) = std::sqrt(P(0, 0));
   W(0, 1) = P(0, 1) / W(0, 0);
   W(1, 1) = std::sqrt(std::max(0.0, P(1, 1) - W(0, 1) * W(0, 1)));
   return W;
+}
+
+void whiten(Sight& sight) {
+  const Matrix23 WA = sight.whitening * sight.A;
+  sight.Wr.noalias() = sight.whitening * sight.r;
+  sight.WJ.topRows<3>() = WA.transpose();
+  sight.WJ.col(0).tail<3>() = sight.q.cross(WA.row(0).transpose());
+  sight.WJ.col(1).tail<3>() = sight.q.cross(WA.row(1).transpose());
 }
 
 }  // namespace
@@ -36,21 +43,6 @@ Eigen::Matrix<double, 2, 6> Sight::J() const {
   Eigen::Matrix<double, 2, 6> J;
   J << A, -A * cross_matrix(q);
   return J;
-}
-
-void add_normal_matrix(const Matrix3d& B, const Vector3d& q, Matrix6& N) {
-  // -B [q]x, whose rows are q x (row of B), and [q]x' B [q]x.
-  const double x = q.x(), y = q.y(), z = q.z();
-  Matrix3d BQ;
-  BQ.col(0) = y * B.col(2) - z * B.col(1);
-  BQ.col(1) = z * B.col(0) - x * B.col(2);
-  BQ.col(2) = x * B.col(1) - y * B.col(0);
-  N.topLeftCorner<3, 3>() += B;
-  N.topRightCorner<3, 3>() += BQ;
-  N.bottomLeftCorner<3, 3>() += BQ.transpose();
-  N.block<1, 3>(3, 3) += y * BQ.row(2) - z * BQ.row(1);
-  N.block<1, 3>(4, 3) += z * BQ.row(0) - x * BQ.row(2);
-  N.block<1, 3>(5, 3) += x * BQ.row(1) - y * BQ.row(0);
 }
 
 PoseModel::PoseModel(const PoseProblem& problem)
@@ -76,11 +68,10 @@ PoseModel::PoseModel(const PoseProblem& problem)
     sight.p_WC_mm = camera.X_WC.translation();
     sight.u_px = observation.u_px;
     sight.covariance_px2 = observation.covariance_px2;
-    const double square = mark.weight * mark.weight;
-    sight.information = residual_ == Residual::reprojection
-                            ? Matrix2d(square * observation.covariance_px2.inverse())
-                            : Matrix2d(square * Matrix2d::Identity());
-    sight.whitening = whitening_of(sight.information);
+    Matrix2d information = Matrix2d::Identity();
+    if (residual_ == Residual::reprojection) information = observation.covariance_px2.inverse();
+    sight.information = mark.weight * mark.weight * information;
+    sight.whitening = (mark.weight > 0 ? mark.weight : 1) * whitening_of(information);
     sight.has_offset = mark.radius_mm > 0 && !mark.normal_O.isZero();
     sight.active = mark.weight > 0;
     if (!sight.active) continue;
@@ -135,9 +126,13 @@ bool PoseModel::linearise(const CentredPose& pose, Sight& sight) const {
   const auto projection = project_with_jacobian(*sight.camera, p_C);
   if (!projection) return false;
   sight.dev_px = sight.u_px - projection->u_px - sight.offset_px;
-  if (residual_ == Residual::algebraic) return linearise_algebraic(p_C, sight);
-  sight.r = sight.dev_px;
-  sight.A = projection->du_dp * sight.R_CW;
+  if (residual_ == Residual::algebraic) {
+    if (!linearise_algebraic(p_C, sight)) return false;
+  } else {
+    sight.r = sight.dev_px;
+    sight.A.noalias() = projection->du_dp * sight.R_CW;
+  }
+  whiten(sight);
   return true;
 }
 
@@ -158,13 +153,9 @@ bool PoseModel::linearise(const CentredPose& pose, NormalEquations& equations) {
     if (!sight.active) continue;
     sight.visible = linearise(pose, sight);
     if (!sight.visible) return false;
-    const Matrix23 WA = sight.whitening * sight.A;
-    const Vector2d Wr = sight.whitening * sight.r;
-    Eigen::Matrix<double, 6, 2> J;  // transposed
-    J << WA.transpose(), sight.q.cross(WA.row(0).transpose()), sight.q.cross(WA.row(1).transpose());
-    equations.N.noalias() += J * J.transpose();
-    equations.g.noalias() += J * Wr;
-    equations.cost += Wr.squaredNorm();
+    equations.N.noalias() += sight.WJ * sight.WJ.transpose();
+    equations.g.noalias() += sight.WJ * sight.Wr;
+    equations.cost += sight.Wr.squaredNorm();
   }
   return true;
 }
@@ -185,9 +176,13 @@ Matrix2d PoseModel::own_covariance(const Sight& sight) const {
 }
 
 Matrix2d PoseModel::total_covariance(const Sight& sight) const {
+  Matrix2d total = own_covariance(sight);
   const double variance_mm2 = sight.mark->sigma_mm * sight.mark->sigma_mm;
-  Matrix2d total = own_covariance(sight) + variance_mm2 * sight.A * sight.A.transpose();
-  if (residual_ == Residual::reprojection) return total + system_variance_px2_ * Matrix2d::Identity();
+  if (variance_mm2 > 0) total += variance_mm2 * sight.A * sight.A.transpose();
+  if (residual_ == Residual::reprojection) {
+    total.diagonal().array() += system_variance_px2_;
+    return total;
+  }
   const Vector2d mm_per_px(sight.depth_mm / sight.camera->fx_px, sight.depth_mm / sight.camera->fy_px);
   return total + Matrix2d((system_variance_px2_ * mm_per_px.cwiseAbs2()).asDiagonal());
 }

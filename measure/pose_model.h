@@ -39,7 +39,7 @@ struct Sight {
   Eigen::Vector2d u_px;
   Eigen::Matrix2d covariance_px2;
   Eigen::Matrix2d information;  // P
-  Eigen::Matrix2d whitening;    // W with W' W = P
+  Eigen::Matrix2d whitening;    // W with W' W = P; for an observation of weight 0 as if its weight were 1
   bool has_offset = false;      // radius and normal are known
   bool active = false;          // takes part in the estimate
   bool visible = false;         // has an image at the pose of the linearisation
@@ -51,6 +51,8 @@ struct Sight {
   Eigen::Vector3d q = Eigen::Vector3d::Zero();       // R_WO * p_MQ
   Eigen::Vector2d dev_px = Eigen::Vector2d::Zero();  // found - projected
   double depth_mm = 0;
+  Eigen::Matrix<double, 6, 2> WJ = Eigen::Matrix<double, 6, 2>::Zero();  // (W J)'
+  Eigen::Vector2d Wr = Eigen::Vector2d::Zero();
 
   Eigen::Matrix<double, 2, 6> J() const;
 };
@@ -102,8 +104,5 @@ class PoseModel {
   Eigen::Vector3d centroid_O_mm_ = Eigen::Vector3d::Zero();
   double extent_mm_ = 1;
 };
-
-// Adds the normal matrix J' P J of an observation whose prediction has A' P A = B.
-void add_normal_matrix(const Eigen::Matrix3d& B, const Eigen::Vector3d& q, Matrix6& N);
 
 }  // namespace zeropose

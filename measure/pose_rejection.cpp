@@ -19,20 +19,24 @@ constexpr double false_alarm = 0.001;
 // More sets of equal size than this are not tried one by one.
 constexpr double max_sets = 2000;
 
-// r / sigma of r, as the length of a vector: r' Cov(r)^-1 r with
-// Cov(r) = C - H C - C H' + J Cov(pose) J', H = J N^-1 J' P; for an unused observation C + J Cov(pose) J'.
-double normalised_deviation(const PoseModel& model, const Precision& precision, const Sight& sight) {
-  if (!sight.visible) return std::numeric_limits<double>::infinity();
-  const Eigen::Matrix<double, 2, 6> J = sight.J();
-  const Eigen::Matrix2d C = model.total_covariance(sight);
-  Eigen::Matrix2d Q = C + J * precision.total_covariance * J.transpose();
+// r / sigma of r, as the length of a vector: r' Cov(r)^-1 r, all whitened, with
+// Cov(r) = C - H C - C H' + J Cov(pose) J', H = J N^-1 J'; for an unused observation C + J Cov(pose) J'.
+// Also r' C^-1 r.
+struct Normalised {
+  double deviation = std::numeric_limits<double>::infinity(), misfit = 0;
+};
+
+Normalised normalise(const PoseModel& model, const Precision& precision, const Sight& sight) {
+  if (!sight.visible) return {};
+  const Eigen::Matrix2d C = sight.whitening * model.total_covariance(sight) * sight.whitening.transpose();
+  // Where an observation is not controlled by the others both r and its variance vanish: keep a little.
+  Eigen::Matrix2d Q = (1 + 1e-9) * C + sight.WJ.transpose() * (precision.total_covariance * sight.WJ);
   if (sight.active) {
-    const Eigen::Matrix2d HC = J * precision.inverse_N * J.transpose() * (sight.information * C);
+    const Eigen::Matrix2d HC = sight.WJ.transpose() * (precision.inverse_N * sight.WJ) * C;
     Q -= HC + HC.transpose();
   }
-  // Where an observation is not controlled by the others both r and its variance vanish.
-  Q += 1e-9 * C;
-  return std::sqrt(std::max(0.0, sight.r.dot(Q.inverse() * sight.r)));
+  const double square = sight.Wr.dot(Q.inverse() * sight.Wr);
+  return {std::sqrt(std::max(0.0, square)), sight.Wr.dot(C.inverse() * sight.Wr)};
 }
 
 Set active_of(const PoseModel& model) {
@@ -187,8 +191,9 @@ Estimate estimate(PoseModel& model, const CentredPose& start) {
   estimate.precision = precision_of(model, estimate.solution);
   estimate.normalised.reserve(model.sights().size());
   for (const Sight& sight : model.sights()) {
-    estimate.normalised.push_back(normalised_deviation(model, estimate.precision, sight));
-    if (sight.active) estimate.misfit += sight.r.dot(model.total_covariance(sight).inverse() * sight.r);
+    const Normalised normalised = normalise(model, estimate.precision, sight);
+    estimate.normalised.push_back(normalised.deviation);
+    if (sight.active) estimate.misfit += normalised.misfit;
   }
   return estimate;
 }

@@ -12,7 +12,7 @@ namespace {
 
 // A step below this (mm at the extent of the marks) is the last one, if the step after it, as the last two
 // predict it, is below the second: what was linearised before it still holds.
-constexpr double last_step_mm = 1e-5, next_step_mm = 1e-7;
+constexpr double last_step_mm = 1e-4, next_step_mm = 1e-7;
 // A step above this changes the eccentricity of the discs' images noticeably (about 1e-7 px per 0.01 mm).
 constexpr double offset_step_mm = 1e-2;
 constexpr int max_rounds = 100;
@@ -153,14 +153,26 @@ Vector6 weakest_direction(const PoseModel& model, const Matrix6& N) {
   return basis * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(N3).eigenvectors().col(0);
 }
 
+// L with L L' = C for a covariance of two.
+Eigen::Matrix2d root_of(const Eigen::Matrix2d& C) {
+  Eigen::Matrix2d L = Eigen::Matrix2d::Zero();
+  L(0, 0) = std::sqrt(C(0, 0));
+  L(1, 0) = C(1, 0) / L(0, 0);
+  L(1, 1) = std::sqrt(std::max(0.0, C(1, 1) - L(1, 0) * L(1, 0)));
+  return L;
+}
+
 // N^-1 (sum J' P C P J) N^-1 for the own and the total covariance C of the residuals.
 void propagate(const PoseModel& model, Precision& precision) {
   Matrix6 own = Matrix6::Zero(), total = Matrix6::Zero();
   for (const Sight& sight : model.sights()) {
     if (!sight.active) continue;
-    const Eigen::Matrix<double, 2, 3> PA = sight.information * sight.A;
-    add_normal_matrix(PA.transpose() * model.own_covariance(sight) * PA, sight.q, own);
-    add_normal_matrix(PA.transpose() * model.total_covariance(sight) * PA, sight.q, total);
+    const Eigen::Matrix<double, 6, 2> own_WJ =
+        sight.WJ * (sight.whitening * root_of(model.own_covariance(sight)));
+    const Eigen::Matrix<double, 6, 2> total_WJ =
+        sight.WJ * (sight.whitening * root_of(model.total_covariance(sight)));
+    own.noalias() += own_WJ * own_WJ.transpose();
+    total.noalias() += total_WJ * total_WJ.transpose();
   }
   precision.covariance = precision.inverse_N * own * precision.inverse_N;
   precision.total_covariance = precision.inverse_N * total * precision.inverse_N;
