@@ -2,7 +2,7 @@
 find_package(Threads REQUIRED)
 
 add_library(zeropose_flags INTERFACE)
-target_include_directories(zeropose_flags INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
+target_include_directories(zeropose_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(zeropose_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Werror)
 if(ZEROPOSE_SANITIZE)
   target_compile_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE} -fno-sanitize-recover=all
