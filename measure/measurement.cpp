@@ -45,11 +45,6 @@ const ImageView* image_of(std::span<const CameraImage> images, std::size_t camer
   return nullptr;
 }
 
-Job compensated(Job job, const Zero& zero) {
-  for (std::size_t i = 0; i < job.marks.size(); ++i) job.marks[i].p_O_mm += zero.compensation_O_mm[i];
-  return job;
-}
-
 Verdict check_zero(const Job& job, const Zero& zero) {
   if (zero.compensation_O_mm.empty())
     return {Code::zero_missing, "no zero measurement was made for job " + job.name};

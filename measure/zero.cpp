@@ -147,6 +147,11 @@ void compensate_marks(std::span<const CalibratedCamera> cameras, const Job& job,
 
 }  // namespace
 
+Job compensated(Job job, const Zero& zero) {
+  for (std::size_t i = 0; i < job.marks.size(); ++i) job.marks[i].p_O_mm += zero.compensation_O_mm[i];
+  return job;
+}
+
 ZeroResult make_zero(std::span<const CalibratedCamera> cameras, const Job& job,
                      std::span<const std::vector<Observation>> frames) {
   ZeroResult result;
@@ -163,8 +168,9 @@ ZeroResult make_zero(std::span<const CalibratedCamera> cameras, const Job& job,
   result.code = result.pose.code;
   result.reason = result.pose.reason;
   if (result.code != Code::ok) return result;
-  result.spread = spread_of(cameras, job, frames, result.pose.X_WO);
   compensate_marks(cameras, job, averaged.observations, result);
+  if (result.code == Code::ok)
+    result.spread = spread_of(cameras, compensated(job, result.zero), frames, result.zero.X_WO0);
   return result;
 }
 

@@ -17,13 +17,17 @@ struct Zero {
   std::vector<Eigen::Vector3d> compensation_O_mm;  // shift of each mark of the job
 };
 
+// The job with its marks where the zero measurement puts them. Precondition: a compensation for each mark.
+Job compensated(Job job, const Zero& zero);
+
 struct ZeroResult {
   Code code = Code::internal;
   std::string reason;
   Zero zero;
-  Vector6 spread =
-      Vector6::Zero();  // standard deviation of the single measurements round the mean, mm and rad
-  PoseResult pose;      // of the averaged observations, before compensation
+  // Standard deviation of the single frames' poses round their mean, mm and rad, with the compensated marks:
+  // what the noise of the frames does, not the calibration.
+  Vector6 spread = Vector6::Zero();
+  PoseResult pose;  // of the averaged observations, before compensation
 };
 
 // From the observations of n frames of the object at its ideal stop. The found pixels are averaged over the
