@@ -2,12 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <fstream>
+#include <set>
+#include <string>
+#include <utility>
+
 #include "measure/code.h"
 #include "tests/support/poses.h"
-
-#include <fstream>
-#include <regex>
-#include <set>
 
 namespace zeropose {
 namespace {
@@ -49,14 +51,16 @@ TEST(Correction, WithoutAFrameIsNoNumber) {
   EXPECT_TRUE(Poses(random).of(CorrectionFrame::none).matrix().array().isNaN().all());
 }
 
-// The enum as written in the header: name and number of each code.
+// The enum as written in the header, lines like "  ok = 0,": name and number of each code.
 std::set<std::pair<std::string, int>> codes_of_header() {
   std::ifstream file(std::string(ZEROPOSE_SOURCE_DIR) + "/measure/code.h");
-  const std::regex line(R"(\s+([a-z_]+) = (\d+),.*)");
   std::set<std::pair<std::string, int>> codes;
-  std::smatch match;
-  for (std::string text; std::getline(file, text);)
-    if (std::regex_match(text, match, line)) codes.emplace(match[1], std::stoi(match[2]));
+  for (std::string text; std::getline(file, text);) {
+    char name[64], comma = 0;
+    int number = 0;
+    if (std::sscanf(text.c_str(), "  %63[a-z_] = %d%c", name, &number, &comma) == 3 && comma == ',')
+      codes.emplace(name, number);
+  }
   return codes;
 }
 
