@@ -1,7 +1,7 @@
 // A link with a cell that is always ready and a cycle that answers by the job's number, for peers that are no
 // C++ programs. Prints "port N" and serves until its standard input ends.
-//   job 1: the correction below after 40 ms, exposed after 15 ms     job 2: not ok, code 301
-//   job 3: silence, so the time-out at 200 ms                        Zero: done after 40 ms, zero id
+//   job 1: the correction below after 400 ms, exposed after 200 ms     job 2: not ok, code 301
+//   job 3: silence, so the time-out at 2 s                        Zero: done after 400 ms, zero id
 //   0x0A0B0C0D
 #include <chrono>
 #include <condition_variable>
@@ -64,9 +64,9 @@ class Cycle {
     }
   }
   void answer(const Request& request) {
-    std::this_thread::sleep_for(milliseconds(15));
+    std::this_thread::sleep_for(milliseconds(200));
     link_->exposure_done(request.id);
-    std::this_thread::sleep_for(milliseconds(25));
+    std::this_thread::sleep_for(milliseconds(200));
     if (request.kind == CommandKind::zero) {
       cell_.zero_id = 0x0A0B0C0D;
       link_->set_cell_state(cell_);
@@ -88,8 +88,8 @@ int serve() {
   options.handshake.convention = Convention::kuka;
   options.handshake.frame = 3;
   options.handshake.robot_index = 2;
-  options.handshake.validity = milliseconds(600);
-  options.handshake.measure_deadline = milliseconds(200);
+  options.handshake.validity = milliseconds(2000);
+  options.handshake.measure_deadline = milliseconds(2000);
   Cycle cycle(CellState{true, true, true, true, 0x01020304, 0x05060708, 0x09090909});
   ModbusTcpLink link(options, [&](const Request& request) { cycle.take(request); });
   cycle.attach(link);

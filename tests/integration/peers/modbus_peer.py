@@ -122,7 +122,7 @@ def other_answers(peer):
     assert (block.robot, block.convention, block.frame) == (2, 2, 3)
     assert (block.marks, block.cameras, block.deviation, block.sigma) == (11, 4, 250, 31)
     assert (block.config_hash, block.calibration_hash, block.zero_id) == (0x01020304, 0x05060708, 0x09090909)
-    assert block.state == 2 and block.validity == 600 and block.has(SIMULATED)
+    assert block.state == 2 and block.validity == 2000 and block.has(SIMULATED)
     # Not ok, and the time-out at the deadline.
     for job, code in ((2, 301), (3, 205)):
         request_id, _ = peer.send(MEASURE, job=job)
