@@ -188,6 +188,13 @@ struct Series {
   }
 };
 
+// What the demo demands of each car.
+void expect_each_car_within_limits(const test::ErrorStatistics& errors, int count) {
+  EXPECT_EQ(errors.count(), count);
+  EXPECT_LE(errors.largest().head<3>().maxCoeff(), 0.4);
+  EXPECT_LE(errors.largest().tail<3>().maxCoeff(), 0.012);
+}
+
 TEST(Accuracy, OfRelativePosesWithACalibrationAsWrongAsInPractice) {
   const Series series(2, quick() ? 2 : 12);
   std::vector<std::vector<Car>> cars(quick() ? 3 : 100);
@@ -206,18 +213,13 @@ TEST(Accuracy, OfRelativePosesWithACalibrationAsWrongAsInPractice) {
   errors.print("rendered, wrong calibrations");
   statistics_of(cars.front()).print("rendered, wrong calibration of seed 1");
   EXPECT_EQ(removed, 0u);
+  expect_each_car_within_limits(errors, static_cast<int>(cars.size() * series.shifts.size()));
+  if (quick()) return;  // three calibrations tell nothing about the mean of many
   const Vector6 rms = errors.rms();
   EXPECT_LE(rms(0), 0.06);
   EXPECT_LE(rms(1), 0.08);
   EXPECT_LE(rms(2), 0.08);
   EXPECT_LE(rms.tail<3>().maxCoeff(), 0.004);
-}
-
-// What the demo demands of each car.
-void expect_each_car_within_limits(const test::ErrorStatistics& errors, int count) {
-  EXPECT_EQ(errors.count(), count);
-  EXPECT_LE(errors.largest().head<3>().maxCoeff(), 0.4);
-  EXPECT_LE(errors.largest().tail<3>().maxCoeff(), 0.012);
 }
 
 TEST(Accuracy, StaysWithOneMarkCovered) {

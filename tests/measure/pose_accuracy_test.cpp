@@ -31,7 +31,7 @@ struct Figures {
 void measure_cars(const test::CellScene& scene, std::span<const CalibratedCamera> believed, int cars,
                   test::Random& random, Figures& figures) {
   const Zero zero = measured_zero(scene, believed, random);
-  const Job job = test::compensated(scene.job, zero);
+  const Job job = compensated(scene.job, zero);
   for (int car = 0; car < cars; ++car) {
     const Pose X_O0O = test::random_shift(random, 30, 0.2);
     const auto observations =

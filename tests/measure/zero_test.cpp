@@ -73,7 +73,7 @@ TEST(Compensation, LeavesTheZeroPoseWhereItIs) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const Wrong wrong(seed);
     const CompensationResult result = wrong.compensated(0.5);
-    const Job job = test::compensated(wrong.scene.job, {wrong.pose.X_WO, result.shifts_O_mm});
+    const Job job = compensated(wrong.scene.job, {wrong.pose.X_WO, result.shifts_O_mm});
     // 2e-8 deg are 1e-6 mm at 3 m.
     test::expect_near(wrong.estimate(job).X_WO, wrong.pose.X_WO, 1e-6, 2e-8);
   }
@@ -108,7 +108,7 @@ TEST(Compensation, OfAMarkThatSeveralCamerasSeeIsTheirBestCompromise) {
   ASSERT_EQ(result.code, Code::ok) << result.reason;
   EXPECT_LT(result.rounds, 30);
   EXPECT_GT(result.largest_deviation_px, 0.1);  // the cameras contradict each other
-  const Job job = test::compensated(wrong.scene.job, {wrong.pose.X_WO, result.shifts_O_mm});
+  const Job job = compensated(wrong.scene.job, {wrong.pose.X_WO, result.shifts_O_mm});
   const PoseResult again = wrong.estimate(job);
   test::expect_near(again.X_WO, wrong.pose.X_WO, 2e-4, 1e-5);
   // No other place of the mark fits all cameras better.

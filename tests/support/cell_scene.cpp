@@ -125,11 +125,6 @@ PoseProblem problem_of(std::span<const CalibratedCamera> cameras, const Job& job
   return problem;
 }
 
-Job compensated(Job job, const Zero& zero) {
-  for (std::size_t i = 0; i < job.marks.size(); ++i) job.marks[i].p_O_mm += zero.compensation_O_mm.at(i);
-  return job;
-}
-
 void ErrorStatistics::add(const Pose& X_O0O, const Pose& X_O0O_true) {
   const SixNumbers a = to_six_numbers(X_O0O), b = to_six_numbers(X_O0O_true);
   Vector6 error;

@@ -27,11 +27,9 @@ std::vector<Observation> observe(std::span<const CalibratedCamera> cameras, cons
 // A pose X_O0O drawn evenly: each of x y z within +-mm, each of rx ry rz within +-deg.
 Pose random_shift(Random& random, double mm, double deg);
 
-// The problem of one observed frame, from the given start, marks compensated as the zero says.
+// The problem of one observed frame, from the given start.
 PoseProblem problem_of(std::span<const CalibratedCamera> cameras, const Job& job,
                        std::span<const Observation> observations, const Pose& X_WO_start);
-
-Job compensated(Job job, const Zero& zero);
 
 // Errors of relative poses, component by component: x y z in mm, rx ry rz in degrees.
 class ErrorStatistics {
