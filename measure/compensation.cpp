@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "measure/eccentricity.h"
+#include "calib/eccentricity.h"
 #include "measure/words.h"
 
 namespace zeropose {

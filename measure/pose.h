@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/camera_model.h"
+#include "calib/residual.h"
 #include "measure/code.h"
 #include "measure/job.h"
 
@@ -20,8 +21,6 @@ struct Observation {
   Eigen::Vector2d u_px = Eigen::Vector2d::Zero();  // centre of the mark's image (for a disc: of the ellipse)
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
 };
-
-enum class Residual { reprojection, algebraic };
 
 struct PoseProblem {
   std::span<const CalibratedCamera> cameras;

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "measure/eccentricity.h"
+#include "calib/eccentricity.h"
 
 namespace zeropose {
 

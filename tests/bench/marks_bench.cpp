@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "measure/eccentricity.h"
+#include "calib/eccentricity.h"
 #include "measure/ellipse_fit.h"
 #include "measure/marks.h"
 #include "tests/support/mark_picture.h"

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "calib/eccentricity.h"
 #include "measure/compensation.h"
-#include "measure/eccentricity.h"
 #include "sim/wrong_calibration.h"
 #include "tests/support/cell_scene.h"
 

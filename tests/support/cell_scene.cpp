@@ -4,7 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "measure/eccentricity.h"
+#include "calib/eccentricity.h"
 
 namespace zeropose::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "measure/eccentricity.h"
+#include "calib/eccentricity.h"
 
 #include <Eigen/LU>
 #include <array>
