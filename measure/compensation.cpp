@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "calib/eccentricity.h"
-#include "measure/words.h"
+#include "calib/words.h"
 
 namespace zeropose {
 namespace {

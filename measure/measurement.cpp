@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/words.h"
 #include "measure/security.h"
-#include "measure/words.h"
 
 namespace zeropose {
 namespace {

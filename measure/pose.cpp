@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/words.h"
 #include "measure/pose_rejection.h"
 #include "measure/pose_solver.h"
 #include "measure/pose_start.h"
-#include "measure/words.h"
 
 namespace zeropose {
 namespace {

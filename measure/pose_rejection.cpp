@@ -7,7 +7,7 @@
 #include <numeric>
 #include <optional>
 
-#include "measure/words.h"
+#include "calib/words.h"
 
 namespace zeropose {
 namespace {

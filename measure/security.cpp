@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "measure/words.h"
+#include "calib/words.h"
 
 namespace zeropose {
 namespace {

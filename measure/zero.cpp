@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/words.h"
 #include "measure/compensation.h"
-#include "measure/words.h"
 
 namespace zeropose {
 namespace {

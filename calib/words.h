@@ -1,4 +1,4 @@
-// Numbers in the sentences that say why a measurement does not count.
+// Numbers in the sentences that say why an input or a result does not count.
 #pragma once
 
 #include <cstdio>
