@@ -1,0 +1,313 @@
+#include "calib/refine.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "calib/eccentricity.h"
+#include "calib/refine_equations.h"
+#include "calib/words.h"
+
+namespace zeropose {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+constexpr double worst_condition = 1e13;
+constexpr double first_damping = 1e-6, largest_damping = 1e12;
+constexpr int disc_rounds = 10;
+
+struct State {
+  CameraModel model;
+  Pose X_WC = Pose::Identity();
+};
+
+// The angles (rx, ry, rz) of R = Rz Ry Rx as axes of rotation in the world: column i turns the i-th alone.
+Eigen::Matrix3d axes_of_angles(const Pose& X_WC) {
+  const SixNumbers six = to_six_numbers(X_WC);
+  const double ry = six.ry_deg / degrees_per_radian, rz = six.rz_deg / degrees_per_radian;
+  Eigen::Matrix3d axes;
+  axes << std::cos(ry) * std::cos(rz), -std::sin(rz), 0, std::cos(ry) * std::sin(rz), std::cos(rz), 0,
+      -std::sin(ry), 0, 1;
+  return axes;
+}
+
+// From the steps of the free parameters to those of all: fixed ones have no column.
+class Freedom {
+ public:
+  Freedom(const RefineProblem& problem)
+      : free_(free_parameters(problem)), lens_(lens_size(problem.start)), one_focal_(problem.one_focal) {
+    angles_free_ = free_.has(Parameter::rx) + free_.has(Parameter::ry) + free_.has(Parameter::rz);
+    for (const Parameter parameter : order())
+      if (free_.has(parameter)) list_.push_back(parameter);
+    aspect_ = problem.start.fx_px / problem.start.fy_px;
+  }
+
+  const std::vector<Parameter>& list() const { return list_; }
+
+  MatrixXd basis(const State& state) const {
+    MatrixXd S = MatrixXd::Zero(10 + lens_, static_cast<Eigen::Index>(list_.size()));
+    const Eigen::Matrix3d axes =
+        partly_turned() ? axes_of_angles(state.X_WC) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
+    const std::vector<Parameter> all = order();
+    for (std::size_t k = 0; k < list_.size(); ++k) {
+      const auto place = std::find(all.begin(), all.end(), list_[k]) - all.begin();
+      const auto column = static_cast<Eigen::Index>(k);
+      if (list_[k] >= Parameter::rx)
+        S.col(column).tail<3>() = axes.col(static_cast<int>(list_[k]) - static_cast<int>(Parameter::rx));
+      else
+        S(place, column) = 1;
+    }
+    // fy follows fx.
+    if (one_focal_ && free_.has(Parameter::fx)) S(1, 0) = 1 / aspect_;
+    return S;
+  }
+
+  State moved_by(const State& state, const VectorXd& step) const {
+    State next = state;
+    SixNumbers six = to_six_numbers(state.X_WC);
+    Vector6 delta = Vector6::Zero();
+    for (std::size_t k = 0; k < list_.size(); ++k) {
+      const double by = step(static_cast<Eigen::Index>(k));
+      if (list_[k] < Parameter::x)
+        change_internal(next.model, list_[k], by);
+      else
+        delta(static_cast<int>(list_[k]) - static_cast<int>(Parameter::x)) = by;
+    }
+    if (!partly_turned()) {
+      next.X_WC = moved(state.X_WC, delta);
+      return next;
+    }
+    six.x_mm += delta(0);
+    six.y_mm += delta(1);
+    six.z_mm += delta(2);
+    six.rx_deg += delta(3) * degrees_per_radian;
+    six.ry_deg += delta(4) * degrees_per_radian;
+    six.rz_deg += delta(5) * degrees_per_radian;
+    next.X_WC = from_six_numbers(six);
+    return next;
+  }
+
+ private:
+  bool partly_turned() const { return angles_free_ == 1 || angles_free_ == 2; }
+
+  std::vector<Parameter> order() const {
+    using enum Parameter;
+    if (lens_ == 1) return {fx, fy, cx, cy, K, x, y, z, rx, ry, rz};
+    return {fx, fy, cx, cy, k1, k2, p1, p2, k3, x, y, z, rx, ry, rz};
+  }
+
+  void change_internal(CameraModel& model, Parameter parameter, double by) const {
+    if (auto* division = std::get_if<Division>(&model.distortion); division && parameter == Parameter::K)
+      division->K += by;
+    if (auto* brown = std::get_if<BrownConrady>(&model.distortion)) {
+      if (parameter == Parameter::k1) brown->k1 += by;
+      if (parameter == Parameter::k2) brown->k2 += by;
+      if (parameter == Parameter::p1) brown->p1 += by;
+      if (parameter == Parameter::p2) brown->p2 += by;
+      if (parameter == Parameter::k3) brown->k3 += by;
+    }
+    if (parameter == Parameter::fx) {
+      model.fx_px += by;
+      if (one_focal_) model.fy_px = model.fx_px / aspect_;
+    }
+    if (parameter == Parameter::fy) model.fy_px += by;
+    if (parameter == Parameter::cx) model.cx_px += by;
+    if (parameter == Parameter::cy) model.cy_px += by;
+  }
+
+  ParameterSet free_;
+  Eigen::Index lens_;
+  bool one_focal_;
+  int angles_free_ = 0;
+  double aspect_ = 1;
+  std::vector<Parameter> list_;
+};
+
+// N and g in the free parameters, scaled to a unit diagonal.
+struct Reduced {
+  MatrixXd N;
+  VectorXd g;
+  VectorXd scale;  // step = scale * scaled step
+};
+
+Reduced reduce(const NormalEquations& all, const MatrixXd& basis) {
+  Reduced reduced;
+  reduced.N = basis.transpose() * all.N * basis;
+  reduced.g = basis.transpose() * all.g;
+  const VectorXd diagonal = reduced.N.diagonal().cwiseMax(std::numeric_limits<double>::min());
+  reduced.scale = diagonal.cwiseSqrt().cwiseInverse();
+  reduced.N = reduced.scale.asDiagonal() * reduced.N * reduced.scale.asDiagonal();
+  reduced.g = reduced.scale.cwiseProduct(reduced.g);
+  return reduced;
+}
+
+struct Descent {
+  State state;
+  NormalEquations equations;
+  int iterations = 0;
+  bool converged = false;
+};
+
+// What the cost is when the residuals are nothing but rounding of the pixels.
+double rounding_of(const RefineProblem& problem, const PointColumns& columns) {
+  const double pixels = (columns.wuu * columns.u_px.square() + columns.wvv * columns.v_px.square()).sum();
+  if (problem.residual == Residual::reprojection) return 1e-24 * pixels;
+  const Pose X_CW = problem.X_WC_start.inverse();
+  double depth = 0;
+  for (const CalibrationPoint& point : problem.points)
+    depth = std::max(depth, std::abs((X_CW * point.p_W_mm).z()));
+  return 1e-24 * pixels * depth * depth;
+}
+
+// A step is the last one when what it promises to save is below the cost's own rounding.
+Descent descend(const RefineProblem& problem, const PointColumns& columns, const Freedom& freedom,
+                const State& start) {
+  Descent at{start, normal_equations(columns, start.model, start.X_WC, problem.residual), 0, false};
+  const double rounding = rounding_of(problem, columns);
+  double damping = first_damping;
+  while (at.equations.visible && at.iterations < problem.max_iterations) {
+    const Reduced reduced = reduce(at.equations, freedom.basis(at.state));
+    ++at.iterations;
+    MatrixXd damped = reduced.N;
+    damped.diagonal().array() += damping;
+    const VectorXd step = damped.ldlt().solve(reduced.g);
+    const double promised = step.dot(reduced.g);
+    at.converged = promised <= 1e-14 * at.equations.cost + rounding;
+    State next = freedom.moved_by(at.state, reduced.scale.cwiseProduct(step));
+    NormalEquations there = normal_equations(columns, next.model, next.X_WC, problem.residual);
+    const bool better = there.visible && there.cost <= at.equations.cost;
+    if (better) {
+      at.state = std::move(next);
+      at.equations = std::move(there);
+      damping = std::max(damping * 0.1, 1e-12);
+    } else {
+      damping *= 10;
+    }
+    if (at.converged) break;
+    if (damping > largest_damping) {  // nothing is left but the rounding of the cost
+      at.converged = promised <= 1e-9 * at.equations.cost;
+      break;
+    }
+  }
+  return at;
+}
+
+// The centre of a disc's image lies beside the image of its centre: what is left for the centre itself.
+double correct_discs(std::span<const CalibrationPoint> points, const State& state, PointColumns& columns) {
+  double largest = 0;
+  const Pose X_CW = state.X_WC.inverse();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!(points[i].disc_radius_mm > 0)) continue;
+    const auto row = static_cast<Eigen::Index>(i);
+    const Eigen::Vector2d beside =
+        ellipse_centre_offset(state.model, X_CW * points[i].p_W_mm, X_CW.linear() * points[i].disc_normal_W,
+                              points[i].disc_radius_mm);
+    const Eigen::Vector2d before(columns.u_px(row), columns.v_px(row));
+    columns.u_px(row) = points[i].u_px.x() - beside.x();
+    columns.v_px(row) = points[i].u_px.y() - beside.y();
+    largest = std::max(largest, (Eigen::Vector2d(columns.u_px(row), columns.v_px(row)) - before).norm());
+  }
+  return largest;
+}
+
+// The parameters with the largest parts in the direction that the points leave open.
+std::string undetermined(const Eigen::SelfAdjointEigenSolver<MatrixXd>& solver,
+                         const std::vector<Parameter>& list) {
+  std::string names;
+  const VectorXd direction = solver.eigenvectors().col(0).cwiseAbs();
+  for (std::size_t k = 0; k < list.size(); ++k)
+    if (direction(static_cast<Eigen::Index>(k)) > 0.3 * direction.maxCoeff())
+      names += (names.empty() ? "" : ", ") + std::string(name_of(list[k]));
+  return names;
+}
+
+RefineResult failed(CalibrationStatus status, std::string reason) {
+  RefineResult result;
+  result.status = status;
+  result.reason = std::move(reason);
+  return result;
+}
+
+// Condition and covariance, or the names of what cannot be told apart.
+void finish(const Freedom& freedom, const Descent& at, RefineResult& result) {
+  const MatrixXd basis = freedom.basis(at.state);
+  const Reduced reduced = reduce(at.equations, basis);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(reduced.N);
+  const VectorXd& values = solver.eigenvalues();
+  const double least = values(0), largest = values(values.size() - 1);
+  result.condition = least > 0 ? largest / least : std::numeric_limits<double>::infinity();
+  if (!(result.condition < worst_condition)) {
+    result.status = CalibrationStatus::not_determined;
+    result.reason = "the points do not tell these parameters apart: " + undetermined(solver, freedom.list()) +
+                    "; fix one of them, or add points at other depths and nearer to the image's edge";
+    return;
+  }
+  const MatrixXd inverse =
+      solver.eigenvectors() * values.cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
+  result.uncertainty.parameters = freedom.list();
+  result.uncertainty.covariance = reduced.scale.asDiagonal() * inverse * reduced.scale.asDiagonal();
+  result.status = CalibrationStatus::ok;
+}
+
+}  // namespace
+
+ParameterSet free_parameters(const RefineProblem& problem) {
+  ParameterSet free;
+  const bool division = lens_size(problem.start) == 1;
+  for (std::size_t i = 0; i < parameter_count; ++i) {
+    const auto parameter = static_cast<Parameter>(i);
+    const bool other_lens = lens_parameters.has(parameter) && (parameter == Parameter::K) != division;
+    if (!other_lens && !problem.fixed.has(parameter)) free.add(parameter);
+  }
+  if (!problem.one_focal) return free;
+  // One of them fixed holds both; else fx stands for both.
+  if (!free.has(Parameter::fx)) free.remove(Parameter::fy);
+  if (!free.has(Parameter::fy)) free.remove(Parameter::fx);
+  free.remove(Parameter::fy);
+  return free;
+}
+
+RefineResult refine(const RefineProblem& problem) {
+  if (problem.residual == Residual::algebraic && lens_size(problem.start) != 1)
+    return failed(CalibrationStatus::wrong_problem, "the algebraic residual is that of the division model");
+  const Freedom freedom(problem);
+  const std::size_t equations = 2 * problem.points.size();
+  if (freedom.list().empty())
+    return failed(CalibrationStatus::wrong_problem, "every parameter is fixed: there is nothing to refine");
+  if (equations < freedom.list().size())
+    return failed(CalibrationStatus::too_few_points, number(problem.points.size()) + " points give " +
+                                                         number(equations) + " equations for " +
+                                                         number(freedom.list().size()) + " parameters");
+  PointColumns columns = columns_of(problem.points);
+  Descent at{{problem.start, problem.X_WC_start}, {}, 0, false};
+  int iterations = 0;
+  for (int round = 0; round < disc_rounds; ++round) {
+    const double change = correct_discs(problem.points, at.state, columns);
+    if (round > 0 && change < 1e-9) break;
+    at = descend(problem, columns, freedom, at.state);
+    iterations += at.iterations;
+  }
+  if (!at.equations.visible)
+    return failed(CalibrationStatus::behind_camera,
+                  "with the start values a point lies behind the camera or has no image: wrong coordinates, "
+                  "pixels or start");
+  RefineResult result;
+  result.model = at.state.model;
+  result.X_WC = at.state.X_WC;
+  result.cost = at.equations.cost;
+  result.iterations = iterations;
+  finish(freedom, at, result);
+  if (result.status == CalibrationStatus::ok && !at.converged && problem.max_iterations > 0) {
+    result.status = CalibrationStatus::not_converged;
+    result.reason = "no minimum after " + number(iterations) + " steps";
+  }
+  return result;
+}
+
+}  // namespace zeropose

@@ -1,0 +1,36 @@
+// The normal equations of a calibration from one view. Internal to the room.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "calib/calibration.h"
+
+namespace zeropose {
+
+// Points column by column, so that the compiler computes several at a time; filled up to whole blocks with
+// repetitions of the last point that have no weight.
+struct PointColumns {
+  Eigen::ArrayXd x_mm, y_mm, z_mm;  // p_W
+  Eigen::ArrayXd u_px, v_px;        // found (a disc's less its eccentricity)
+  Eigen::ArrayXd wuu, wuv, wvv;     // information of the pixel, px^-2
+  bool correlated = false;          // some wuv is not 0
+};
+PointColumns columns_of(std::span<const CalibrationPoint> points);
+
+// For all parameters of the model in the order fx fy cx cy, the lens' (K or k1 k2 p1 p2 k3), then the
+// pose's delta of moved(X_WC): translation mm, rotation rad.
+struct NormalEquations {
+  bool visible = false;  // every point has an image, all numbers are finite
+  double cost = 0;       // sum of squared residuals
+  Eigen::MatrixXd N;     // J' J, both triangles
+  Eigen::VectorXd g;     // J' r, r = found - predicted
+};
+NormalEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
+                                 Residual residual);
+
+// Number of the lens' parameters: 1 or 5.
+Eigen::Index lens_size(const CameraModel& camera);
+
+}  // namespace zeropose
