@@ -37,11 +37,24 @@ Eigen::Matrix3d axes_of_angles(const Pose& X_WC) {
   return axes;
 }
 
-// From the steps of the free parameters to those of all: fixed ones have no column.
+Vector3d centroid_of(std::span<const CalibrationPoint> points) {
+  Vector3d sum = Vector3d::Zero();
+  for (const CalibrationPoint& point : points) sum += point.p_W_mm;
+  return sum / static_cast<double>(points.size());
+}
+
+// From the steps of the free parameters to those of all: fixed ones have no column. A pose that is free as a
+// whole steps along the camera's axes and turns about the points' centroid: the valley between origin and
+// rotation, curved about the camera's centre, is straight there. Its columns are then those of this step
+// (orbit), and those of the parameters themselves for the covariance.
 class Freedom {
  public:
   Freedom(const RefineProblem& problem)
-      : free_(free_parameters(problem)), lens_(lens_size(problem.start)), one_focal_(problem.one_focal) {
+      : free_(free_parameters(problem)),
+        lens_(lens_size(problem.start)),
+        one_focal_(problem.one_focal),
+        orbits_(free_.has_all(pose_parameters)),
+        centroid_(centroid_of(problem.points)) {
     angles_free_ = free_.has(Parameter::rx) + free_.has(Parameter::ry) + free_.has(Parameter::rz);
     for (const Parameter parameter : order())
       if (free_.has(parameter)) list_.push_back(parameter);
@@ -49,6 +62,17 @@ class Freedom {
   }
 
   const std::vector<Parameter>& list() const { return list_; }
+
+  MatrixXd step_basis(const State& state) const {
+    MatrixXd S = basis(state);
+    if (!orbits_) return S;
+    const Vector3d arm = state.X_WC.translation() - centroid_;
+    S.bottomRightCorner<6, 6>().setZero();
+    S.bottomRightCorner<6, 3>().topRows<3>() = -cross_matrix(arm);
+    S.bottomRightCorner<3, 3>().setIdentity();
+    S.rightCols<6>().leftCols<3>().middleRows<3>(4 + lens_) = state.X_WC.linear();
+    return S;
+  }
 
   MatrixXd basis(const State& state) const {
     MatrixXd S = MatrixXd::Zero(10 + lens_, static_cast<Eigen::Index>(list_.size()));
@@ -78,6 +102,13 @@ class Freedom {
         change_internal(next.model, list_[k], by);
       else
         delta(static_cast<int>(list_[k]) - static_cast<int>(Parameter::x)) = by;
+    }
+    if (orbits_) {
+      const Eigen::Matrix3d turn = exp_so3(delta.tail<3>());
+      next.X_WC.linear() = turn * state.X_WC.linear();
+      next.X_WC.translation() =
+          centroid_ + turn * (state.X_WC.translation() - centroid_ + state.X_WC.linear() * delta.head<3>());
+      return next;
     }
     if (!partly_turned()) {
       next.X_WC = moved(state.X_WC, delta);
@@ -124,6 +155,8 @@ class Freedom {
   ParameterSet free_;
   Eigen::Index lens_;
   bool one_focal_;
+  bool orbits_;
+  Vector3d centroid_;
   int angles_free_ = 0;
   double aspect_ = 1;
   std::vector<Parameter> list_;
@@ -172,7 +205,7 @@ Descent descend(const RefineProblem& problem, const PointColumns& columns, const
   const double rounding = rounding_of(problem, columns);
   double damping = first_damping;
   while (at.equations.visible && at.iterations < problem.max_iterations) {
-    const Reduced reduced = reduce(at.equations, freedom.basis(at.state));
+    const Reduced reduced = reduce(at.equations, freedom.step_basis(at.state));
     ++at.iterations;
     MatrixXd damped = reduced.N;
     damped.diagonal().array() += damping;

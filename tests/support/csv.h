@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
@@ -13,9 +14,9 @@ namespace zeropose::test {
 
 class CsvTable {
  public:
-  // path relative to the root of the sources; throws std::runtime_error when it cannot be read.
+  // path: absolute, or relative to the root of the sources; throws std::runtime_error when it cannot be read.
   explicit CsvTable(const std::string& path) {
-    std::ifstream file(std::string(ZEROPOSE_SOURCE_DIR) + "/" + path);
+    std::ifstream file(std::filesystem::path(ZEROPOSE_SOURCE_DIR) / path);
     if (!file) throw std::runtime_error("cannot read " + path);
     for (std::string line; std::getline(file, line);) {
       if (line.empty() || line.front() == '#') continue;
