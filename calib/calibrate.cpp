@@ -86,7 +86,8 @@ std::string internals_text(const CameraModel& model) {
 
 LinearResult linear_start(const CalibrationProblem& problem, CalibrationMethod method, const Way& way,
                           const Vector2d& origin_px) {
-  LinearProblem linear{way.points, origin_px, aspect_of(problem), problem.tz_mm};
+  LinearProblem linear{way.points, origin_px, aspect_of(problem), problem.tz_mm, {}};
+  if (problem.start && problem.fixed.has(Parameter::fy)) linear.fy_px = problem.start->model.fy_px;
   if (method == CalibrationMethod::linear) return calibrate_linear(linear);
   if (method == CalibrationMethod::noncoplanar) return calibrate_noncoplanar(linear);
   // What lies off the plane takes part in the refinement, not here.

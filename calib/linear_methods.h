@@ -15,7 +15,9 @@ struct LinearProblem {
   std::span<const CalibrationPoint> points;
   Eigen::Vector2d origin_px = Eigen::Vector2d::Zero();  // held (C1, C2)
   double aspect = 1;                                    // fx / fy, held (C1)
-  std::optional<double> tz_mm;                          // depth of the points' centroid (C1, parallel board)
+  // What tells the distance of a board parallel to the chip (C1): it, or the focal length.
+  std::optional<double> tz_mm;  // depth of the points' centroid
+  std::optional<double> fy_px;
 };
 
 struct LinearResult {

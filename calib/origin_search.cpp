@@ -25,7 +25,7 @@ double residual_sum_e1(std::span<const CalibrationPoint> points, const CameraMod
 
 OriginResult search_origin(const OriginProblem& problem, const PointLayout& layout) {
   const auto calibrated = [&](const Eigen::Vector2d& origin_px) {
-    const LinearProblem linear{problem.points, origin_px, problem.aspect, {}};
+    const LinearProblem linear{problem.points, origin_px, problem.aspect, {}, {}};
     return layout.coplanar ? calibrate_coplanar(linear, layout.X_WP) : calibrate_noncoplanar(linear);
   };
   OriginResult result;

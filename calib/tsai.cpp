@@ -20,8 +20,9 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr std::size_t coplanar_points = 5, noncoplanar_points = 7;
-constexpr double least_tilt_deg = 0.5;
-constexpr double worst_focal_sigma = 0.5;  // of the focal length itself: it is not determined
+constexpr double least_depth_change = 0.002;  // over a board, relative: less is no perspective
+constexpr double nearly_parallel_deg = 5;     // taken for parallel where the user gives the distance
+constexpr double worst_focal_sigma = 0.5;     // of the focal length itself: it is not determined
 
 // Pixels about the origin, and the points about their centroid in the frame that the method works in.
 struct Pairs {
@@ -170,6 +171,24 @@ double tilt_deg(const Matrix2d& B) {
   return std::acos(std::min(1.0, std::abs(B.determinant()))) * degrees_per_radian;
 }
 
+// How much the depth of the plane's points changes across them, relative: from the homography, which needs
+// neither origin nor focal length.
+double depth_change(const Pairs& pairs) {
+  const Eigen::Index n = static_cast<Eigen::Index>(pairs.p_mm.size());
+  MatrixXd A = MatrixXd::Zero(2 * n, 9);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    const Vector2d x = pairs.x_px[k] / pairs.pixel_scale, p = pairs.p_mm[k].head<2>() / pairs.point_scale;
+    A.row(2 * i) << p.x(), p.y(), 1, 0, 0, 0, -x.x() * p.x(), -x.x() * p.y(), -x.x();
+    A.row(2 * i + 1) << 0, 0, 0, p.x(), p.y(), 1, -x.y() * p.x(), -x.y() * p.y(), -x.y();
+  }
+  const VectorXd h = null_vector(A).x;
+  double largest = 0;
+  for (const Vector3d& p : pairs.p_mm)
+    largest = std::max(largest, std::abs(h.segment<2>(6).dot(p.head<2>()) / pairs.point_scale));
+  return largest / std::abs(h(8));
+}
+
 LinearResult parallel(const LinearProblem& problem, const Pairs& pairs, const Matrix2d& B, const Vector2d& t,
                       const Pose& X_WP) {
   Matrix3d flat = Matrix3d::Zero();
@@ -177,15 +196,15 @@ LinearResult parallel(const LinearProblem& problem, const Pairs& pairs, const Ma
   flat(2, 2) = B.determinant() > 0 ? 1 : -1;
   const Matrix3d R = nearest_rotation(flat);
   Depth depth = solve_ratios(depth_rows(pairs, R, t, 1));
-  if (!problem.tz_mm)
-    return failure(CalibrationStatus::parallel_to_chip,
-                   "the board is parallel to the chip (" + number(tilt_deg(B)) +
-                       " deg): focal length and distance cannot be told apart, only f / tz = " +
-                       number(depth.f_by_tz, 6) +
-                       " px/mm and K = " + number(depth.f_by_tz * depth.Kf_by_tz, 9) +
-                       " tz^2 / mm^2; tilt it by 20 deg or more, or give its distance tz",
-                   depth.condition);
-  depth.tz = *problem.tz_mm;
+  if (!problem.tz_mm && !problem.fy_px)
+    return failure(
+        CalibrationStatus::parallel_to_chip,
+        "the board is parallel to the chip (its depth changes by " + number(100 * depth_change(pairs), 3) +
+            " % across it): focal length and distance cannot be told apart, only f / tz = " +
+            number(depth.f_by_tz, 6) + " px/mm and K = " + number(depth.f_by_tz * depth.Kf_by_tz, 9) +
+            " tz^2 / mm^2; tilt it by 20 deg or more, or give its distance tz",
+        depth.condition);
+  depth.tz = problem.tz_mm ? *problem.tz_mm : *problem.fy_px / depth.f_by_tz;
   depth.f = depth.f_by_tz * depth.tz;
   depth.Kf = depth.Kf_by_tz * depth.tz;
   const Pose X_PC = pose_from(R, Vector3d(t.x(), t.y(), depth.tz), Vector3d::Zero());
@@ -215,7 +234,9 @@ LinearResult calibrate_coplanar(const LinearProblem& problem, const Pose& X_WP) 
                              std::hypot(B(0, 0) - B(1, 1), B(0, 1) + B(1, 0)));
   B /= size;
   const Vector2d t = Vector2d(alignment.tx, alignment.ty) / size;
-  if (tilt_deg(B) < least_tilt_deg) return parallel(problem, pairs, B, t, X_WP);
+  const bool flat = depth_change(pairs) < least_depth_change;
+  if (flat || (problem.tz_mm && tilt_deg(B) < nearly_parallel_deg))
+    return parallel(problem, pairs, B, t, X_WP);
   Matrix3d R = rotation_from_block(B, 1);
   Depth depth = solve_depth(depth_rows(pairs, R, t, 1));
   if (depth.f < 0) {

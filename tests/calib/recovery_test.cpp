@@ -203,6 +203,14 @@ TEST(Recovery, ABoardParallelToTheChipWithItsDistanceGiven) {
   expect_camera_near(found.model, found.X_WC, truth);
 }
 
+TEST(Recovery, ABoardParallelToTheChipWithTheInternalsHeld) {
+  const Scene truth = scene(test::division_camera(-0.2), looking_at_origin(900, 0, 15), grid(7, 1, 40));
+  CalibrationProblem problem = problem_of(truth);
+  problem.start = CalibrationStart{truth.camera, {}};
+  problem.fixed = {fx, fy, cx, cy, K};
+  expect_recovered(problem, truth);
+}
+
 TEST(Recovery, DiscsAreNotTakenForPoints) {
   const Scene plain = scene(test::division_camera(-0.2), looking_at_origin(900, 35, 20), grid(5, 3, 70));
   Scene discs = plain;
