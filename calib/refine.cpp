@@ -19,6 +19,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double worst_condition = 1e13;
+constexpr double last_step = 1e-10;  // of the cost
 constexpr double first_damping = 1e-6, largest_damping = 1e12;
 constexpr int disc_rounds = 10;
 
@@ -56,43 +57,54 @@ class Freedom {
         orbits_(free_.has_all(pose_parameters)),
         centroid_(centroid_of(problem.points)) {
     angles_free_ = free_.has(Parameter::rx) + free_.has(Parameter::ry) + free_.has(Parameter::rz);
-    for (const Parameter parameter : order())
-      if (free_.has(parameter)) list_.push_back(parameter);
+    const std::vector<Parameter> all = order();
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!free_.has(all[i])) continue;
+      list_.push_back(all[i]);
+      places_.push_back(static_cast<Eigen::Index>(i));
+    }
     aspect_ = problem.start.fx_px / problem.start.fy_px;
   }
 
   const std::vector<Parameter>& list() const { return list_; }
 
-  MatrixXd step_basis(const State& state) const {
-    MatrixXd S = basis(state);
-    if (!orbits_) return S;
-    const Vector3d arm = state.X_WC.translation() - centroid_;
-    S.bottomRightCorner<6, 6>().setZero();
-    S.bottomRightCorner<6, 3>().topRows<3>() = -cross_matrix(arm);
-    S.bottomRightCorner<3, 3>().setIdentity();
-    S.rightCols<6>().leftCols<3>().middleRows<3>(4 + lens_) = state.X_WC.linear();
-    return S;
+  // The pose's columns of the step by those of moved().
+  Matrix6 pose_of_step(const State& state) const {
+    Matrix6 T = Matrix6::Identity();
+    if (!orbits_) return pose_of_parameters(state);
+    T.topLeftCorner<3, 3>() = state.X_WC.linear();
+    T.topRightCorner<3, 3>() = -cross_matrix(state.X_WC.translation() - centroid_);
+    return T;
+  }
+  Matrix6 pose_of_parameters(const State& state) const {
+    Matrix6 T = Matrix6::Identity();
+    if (partly_turned()) T.bottomRightCorner<3, 3>() = axes_of_angles(state.X_WC);
+    return T;
   }
 
-  MatrixXd basis(const State& state) const {
-    MatrixXd S = MatrixXd::Zero(10 + lens_, static_cast<Eigen::Index>(list_.size()));
-    const Eigen::Matrix3d axes =
-        partly_turned() ? axes_of_angles(state.X_WC) : Eigen::Matrix3d(Eigen::Matrix3d::Identity());
-    const std::vector<Parameter> all = order();
-    for (std::size_t k = 0; k < list_.size(); ++k) {
-      const auto place = std::find(all.begin(), all.end(), list_[k]) - all.begin();
-      const auto column = static_cast<Eigen::Index>(k);
-      if (list_[k] >= Parameter::rx)
-        S.col(column).tail<3>() = axes.col(static_cast<int>(list_[k]) - static_cast<int>(Parameter::rx));
-      else
-        S(place, column) = 1;
+  // The equations in the free parameters.
+  NormalEquations chosen(NormalEquations all, const Matrix6& pose) const {
+    all.N.rightCols<6>() *= pose;
+    all.N.bottomRows<6>() = pose.transpose() * all.N.bottomRows<6>();
+    all.g.tail<6>() = pose.transpose() * all.g.tail<6>();
+    if (one_focal_) {  // fy = fx / aspect
+      all.N.col(0) += all.N.col(1) / aspect_;
+      all.N.row(0) += all.N.row(1) / aspect_;
+      all.g(0) += all.g(1) / aspect_;
     }
-    // fy follows fx.
-    if (one_focal_ && free_.has(Parameter::fx)) S(1, 0) = 1 / aspect_;
-    return S;
+    NormalEquations chosen = all;
+    const auto n = static_cast<Eigen::Index>(list_.size());
+    chosen.N.resize(n, n);
+    chosen.g.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const Eigen::Index row = places_[static_cast<std::size_t>(i)];
+      chosen.g(i) = all.g(row);
+      for (Eigen::Index j = 0; j < n; ++j) chosen.N(i, j) = all.N(row, places_[static_cast<std::size_t>(j)]);
+    }
+    return chosen;
   }
 
-  State moved_by(const State& state, const VectorXd& step) const {
+  State moved_by(const State& state, const SmallVector& step) const {
     State next = state;
     SixNumbers six = to_six_numbers(state.X_WC);
     Vector6 delta = Vector6::Zero();
@@ -160,24 +172,23 @@ class Freedom {
   int angles_free_ = 0;
   double aspect_ = 1;
   std::vector<Parameter> list_;
+  std::vector<Eigen::Index> places_;  // of the listed ones among all
 };
 
-// N and g in the free parameters, scaled to a unit diagonal.
-struct Reduced {
-  MatrixXd N;
-  VectorXd g;
-  VectorXd scale;  // step = scale * scaled step
+// With a unit diagonal.
+struct Scaled {
+  SmallMatrix N;
+  SmallVector g;
+  SmallVector scale;  // step = scale * scaled step
 };
 
-Reduced reduce(const NormalEquations& all, const MatrixXd& basis) {
-  Reduced reduced;
-  reduced.N = basis.transpose() * all.N * basis;
-  reduced.g = basis.transpose() * all.g;
-  const VectorXd diagonal = reduced.N.diagonal().cwiseMax(std::numeric_limits<double>::min());
-  reduced.scale = diagonal.cwiseSqrt().cwiseInverse();
-  reduced.N = reduced.scale.asDiagonal() * reduced.N * reduced.scale.asDiagonal();
-  reduced.g = reduced.scale.cwiseProduct(reduced.g);
-  return reduced;
+Scaled scaled(const NormalEquations& equations) {
+  Scaled result;
+  result.scale =
+      equations.N.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
+  result.N = result.scale.asDiagonal() * equations.N * result.scale.asDiagonal();
+  result.g = result.scale.cwiseProduct(equations.g);
+  return result;
 }
 
 struct Descent {
@@ -198,21 +209,22 @@ double rounding_of(const RefineProblem& problem, const PointColumns& columns) {
   return 1e-24 * pixels * depth * depth;
 }
 
-// A step is the last one when what it promises to save is below the cost's own rounding.
+// A step is the last one when it promises to save next to nothing: what is then left to the minimum is the
+// square of that.
 Descent descend(const RefineProblem& problem, const PointColumns& columns, const Freedom& freedom,
                 const State& start) {
   Descent at{start, normal_equations(columns, start.model, start.X_WC, problem.residual), 0, false};
   const double rounding = rounding_of(problem, columns);
   double damping = first_damping;
   while (at.equations.visible && at.iterations < problem.max_iterations) {
-    const Reduced reduced = reduce(at.equations, freedom.step_basis(at.state));
+    const Scaled own = scaled(freedom.chosen(at.equations, freedom.pose_of_step(at.state)));
     ++at.iterations;
-    MatrixXd damped = reduced.N;
+    SmallMatrix damped = own.N;
     damped.diagonal().array() += damping;
-    const VectorXd step = damped.ldlt().solve(reduced.g);
-    const double promised = step.dot(reduced.g);
-    at.converged = promised <= 1e-14 * at.equations.cost + rounding;
-    State next = freedom.moved_by(at.state, reduced.scale.cwiseProduct(step));
+    const SmallVector step = damped.llt().solve(own.g);
+    const double promised = step.dot(own.g);
+    at.converged = promised <= last_step * at.equations.cost + rounding;
+    State next = freedom.moved_by(at.state, own.scale.cwiseProduct(step));
     NormalEquations there = normal_equations(columns, next.model, next.X_WC, problem.residual);
     const bool better = there.visible && there.cost <= at.equations.cost;
     if (better) {
@@ -250,9 +262,9 @@ double correct_discs(std::span<const CalibrationPoint> points, const State& stat
 }
 
 // The parameters with the largest parts in the direction that the points leave open.
-std::string undetermined(const Eigen::SelfAdjointEigenSolver<MatrixXd>& solver,
-                         const std::vector<Parameter>& list) {
+std::string undetermined(const MatrixXd& N, const std::vector<Parameter>& list) {
   std::string names;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(N);
   const VectorXd direction = solver.eigenvectors().col(0).cwiseAbs();
   for (std::size_t k = 0; k < list.size(); ++k)
     if (direction(static_cast<Eigen::Index>(k)) > 0.3 * direction.maxCoeff())
@@ -267,24 +279,23 @@ RefineResult failed(CalibrationStatus status, std::string reason) {
   return result;
 }
 
+double norm1(const SmallMatrix& M) { return M.cwiseAbs().colwise().sum().maxCoeff(); }
+
 // Condition and covariance, or the names of what cannot be told apart.
 void finish(const Freedom& freedom, const Descent& at, RefineResult& result) {
-  const MatrixXd basis = freedom.basis(at.state);
-  const Reduced reduced = reduce(at.equations, basis);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(reduced.N);
-  const VectorXd& values = solver.eigenvalues();
-  const double least = values(0), largest = values(values.size() - 1);
-  result.condition = least > 0 ? largest / least : std::numeric_limits<double>::infinity();
-  if (!(result.condition < worst_condition)) {
+  const Scaled own = scaled(freedom.chosen(at.equations, freedom.pose_of_parameters(at.state)));
+  const Eigen::LLT<SmallMatrix> factor(own.N);
+  const auto n = own.N.rows();
+  const SmallMatrix inverse = factor.solve(SmallMatrix::Identity(n, n));
+  result.condition = norm1(own.N) * norm1(inverse);
+  if (factor.info() != Eigen::Success || !(result.condition < worst_condition)) {
     result.status = CalibrationStatus::not_determined;
-    result.reason = "the points do not tell these parameters apart: " + undetermined(solver, freedom.list()) +
+    result.reason = "the points do not tell these parameters apart: " + undetermined(own.N, freedom.list()) +
                     "; fix one of them, or add points at other depths and nearer to the image's edge";
     return;
   }
-  const MatrixXd inverse =
-      solver.eigenvectors() * values.cwiseInverse().asDiagonal() * solver.eigenvectors().transpose();
   result.uncertainty.parameters = freedom.list();
-  result.uncertainty.covariance = reduced.scale.asDiagonal() * inverse * reduced.scale.asDiagonal();
+  result.uncertainty.covariance = own.scale.asDiagonal() * inverse * own.scale.asDiagonal();
   result.status = CalibrationStatus::ok;
 }
 

@@ -112,31 +112,44 @@ struct Residuals {
   std::array<int, static_cast<std::size_t>(n)> places;  // of the columns of J among all parameters
 };
 
-// Adds Ja' W Jb and Ja' W rb into their places of the whole.
+// Adds J' W J and J' W r into their places of the whole, the lower triangle by places.
 template <int n>
-void add_product(const Residuals<n>& a, const Residuals<n>& b, const Column& w, NormalEquations& sum) {
-  const Rows<n> weighted = a.J.colwise() * w;
-  const Eigen::Matrix<double, n, n> product = weighted.matrix().transpose().lazyProduct(b.J.matrix());
-  const Eigen::Matrix<double, n, 1> right = weighted.matrix().transpose().lazyProduct(b.r.matrix());
+void add_own(const Residuals<n>& a, const Column& w, NormalEquations& sum) {
   for (int i = 0; i < n; ++i) {
     const int row = a.places[static_cast<std::size_t>(i)];
-    sum.g(row) += right(i);
-    for (int j = 0; j < n; ++j) sum.N(row, b.places[static_cast<std::size_t>(j)]) += product(i, j);
+    const Column weighted = a.J.col(i) * w;
+    sum.g(row) += (weighted * a.r).sum();
+    for (int j = 0; j <= i; ++j)
+      sum.N(row, a.places[static_cast<std::size_t>(j)]) += (weighted * a.J.col(j)).sum();
   }
+  sum.cost += (w * a.r.square()).sum();
+}
+
+// The same for the covariance between the two residuals.
+template <int n>
+void add_mixed(const Residuals<n>& a, const Residuals<n>& b, const Column& w, NormalEquations& sum) {
+  for (int i = 0; i < n; ++i) {
+    const int row = a.places[static_cast<std::size_t>(i)];
+    const Column weighted = a.J.col(i) * w;
+    sum.g(row) += (weighted * b.r).sum();
+    sum.g(b.places[static_cast<std::size_t>(i)]) += (w * b.J.col(i) * a.r).sum();
+    for (int j = 0; j < n; ++j) {
+      const int column = b.places[static_cast<std::size_t>(j)];
+      const double product = (weighted * b.J.col(j)).sum();
+      // It stands in both triangles, on the diagonal twice.
+      if (row >= column) sum.N(row, column) += product;
+      if (row <= column) sum.N(column, row) += product;
+    }
+  }
+  sum.cost += 2 * (w * a.r * b.r).sum();
 }
 
 template <int n>
 void add_both(const Residuals<n>& u, const Residuals<n>& v, const PointColumns& points, Eigen::Index first,
               NormalEquations& sum) {
-  const Column wuu = points.wuu.segment<block>(first), wvv = points.wvv.segment<block>(first);
-  add_product(u, u, wuu, sum);
-  add_product(v, v, wvv, sum);
-  sum.cost += (wuu * u.r.square() + wvv * v.r.square()).sum();
-  if (!points.correlated) return;
-  const Column wuv = points.wuv.segment<block>(first);
-  add_product(u, v, wuv, sum);
-  add_product(v, u, wuv, sum);
-  sum.cost += 2 * (wuv * u.r * v.r).sum();
+  add_own(u, points.wuu.segment<block>(first), sum);
+  add_own(v, points.wvv.segment<block>(first), sum);
+  if (points.correlated) add_mixed(u, v, points.wuv.segment<block>(first), sum);
 }
 
 template <class Lens>
@@ -246,11 +259,12 @@ NormalEquations normal_equations(const PointColumns& points, const CameraModel& 
                                  Residual residual) {
   const Eigen::Index size = 10 + lens_size(camera);
   NormalEquations sum;
-  sum.N = Eigen::MatrixXd::Zero(size, size);
-  sum.g = Eigen::VectorXd::Zero(size);
+  sum.N.setZero(size, size);
+  sum.g.setZero(size);
   const Eigen::Index n = points.x_mm.size();
   for (Eigen::Index first = 0; first < n; first += block)
     if (!add_block(points, first, camera, X_WC, residual, sum)) return sum;
+  sum.N.triangularView<Eigen::StrictlyUpper>() = sum.N.transpose();
   sum.visible = std::isfinite(sum.cost) && sum.g.allFinite();
   return sum;
 }

@@ -19,13 +19,17 @@ struct PointColumns {
 };
 PointColumns columns_of(std::span<const CalibrationPoint> points);
 
+// Up to 15 parameters, without a heap.
+using SmallMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 15, 15>;
+using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 15, 1>;
+
 // For all parameters of the model in the order fx fy cx cy, the lens' (K or k1 k2 p1 p2 k3), then the
 // pose's delta of moved(X_WC): translation mm, rotation rad.
 struct NormalEquations {
   bool visible = false;  // every point has an image, all numbers are finite
   double cost = 0;       // sum of squared residuals
-  Eigen::MatrixXd N;     // J' J, both triangles
-  Eigen::VectorXd g;     // J' r, r = found - predicted
+  SmallMatrix N;         // J' J, both triangles
+  SmallVector g;         // J' r, r = found - predicted
 };
 NormalEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
                                  Residual residual);
