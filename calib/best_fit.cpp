@@ -1,5 +1,6 @@
 #include "calib/best_fit.h"
 
+#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -42,18 +43,35 @@ bool is_line(const Matrix3d& spread) {
   return !(squares(1) > collinear_ratio * collinear_ratio * squares(0));
 }
 
+// For unit variance of a coordinate of weight 1: a point moves by dt + w x (R p_B).
+Matrix6 cofactor(std::span<const PointPair> pairs, const Pose& X_AB) {
+  Eigen::MatrixXd N = Eigen::MatrixXd::Zero(6, 6);
+  for (const auto& pair : pairs) {
+    Eigen::MatrixXd J(3, 6);
+    J << Matrix3d::Identity(), -cross_matrix(X_AB.linear() * pair.p_B_mm);
+    N += pair.weight * J.transpose() * J;
+  }
+  return N.inverse();
+}
+
 bool is_finite(const PointPair& pair) {
   return pair.p_A_mm.allFinite() && pair.p_B_mm.allFinite() && std::isfinite(pair.weight) && pair.weight >= 0;
+}
+
+BestFitResult failed(BestFitStatus status) {
+  BestFitResult result;
+  result.status = status;
+  return result;
 }
 
 }  // namespace
 
 BestFitResult best_fit(std::span<const PointPair> pairs) {
-  if (!std::all_of(pairs.begin(), pairs.end(), is_finite)) return {BestFitStatus::not_finite, {}, {}, 0};
+  if (!std::all_of(pairs.begin(), pairs.end(), is_finite)) return failed(BestFitStatus::not_finite);
   if (std::count_if(pairs.begin(), pairs.end(), [](const auto& pair) { return pair.weight > 0; }) < 3)
-    return {BestFitStatus::too_few_points, {}, {}, 0};
+    return failed(BestFitStatus::too_few_points);
   const Moments m = moments_of(pairs);
-  if (is_line(m.spread_A) || is_line(m.spread_B)) return {BestFitStatus::collinear, {}, {}, 0};
+  if (is_line(m.spread_A) || is_line(m.spread_B)) return failed(BestFitStatus::collinear);
 
   BestFitResult result;
   result.status = BestFitStatus::ok;
@@ -65,6 +83,10 @@ BestFitResult best_fit(std::span<const PointPair> pairs) {
     sum += pair.weight * result.residuals_mm.back().squaredNorm();
   }
   result.rms_mm = std::sqrt(sum / m.weight);
+  const auto used =
+      std::count_if(pairs.begin(), pairs.end(), [](const auto& pair) { return pair.weight > 0; });
+  result.sigma_mm = std::sqrt(sum / (3.0 * static_cast<double>(used) - 6));
+  result.covariance = result.sigma_mm * result.sigma_mm * cofactor(pairs, result.X_AB);
   return result;
 }
 

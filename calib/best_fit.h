@@ -23,6 +23,8 @@ struct BestFitResult {
   Pose X_AB = Pose::Identity();
   std::vector<Eigen::Vector3d> residuals_mm;  // p_A - X_AB * p_B, one per pair
   double rms_mm = 0;                          // root of the weighted mean squared distance
+  double sigma_mm = 0;  // of one coordinate of weight 1, from the residuals; 0 where they are exact
+  Matrix6 covariance = Matrix6::Zero();  // of the delta in moved(): mm, rad; scaled with sigma_mm
 };
 
 // Closed form by SVD (Umeyama 1991 without scale). Needs three points of positive weight that are not

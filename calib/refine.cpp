@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 
 constexpr double worst_condition = 1e13;
 constexpr double last_step = 1e-10;  // of the cost
-constexpr double first_damping = 1e-6, largest_damping = 1e12;
+constexpr double first_damping = 1e-9, largest_damping = 1e12;
 constexpr int disc_rounds = 10;
 
 struct State {
