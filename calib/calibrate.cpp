@@ -189,8 +189,9 @@ bool shares_focal(const CalibrationProblem& problem, const Way& way) {
 }
 
 void refine_way(const CalibrationProblem& problem, const ParameterSet& also_fixed, Way& way) {
-  RefineProblem refinement{way.points,      way.model, way.X_WC, problem.fixed, shares_focal(problem, way),
-                           problem.residual};
+  RefineProblem refinement{
+      way.points,       way.model,     way.X_WC, problem.fixed, shares_focal(problem, way),
+      problem.residual, problem.robust};
   refinement.fixed.add(also_fixed);
   if (problem.one_focal && !problem.fixed.has(Parameter::fx) && !problem.fixed.has(Parameter::fy))
     refinement.start.fx_px = refinement.start.fy_px =
@@ -274,8 +275,8 @@ void refine_by_strategy(const CalibrationProblem& problem, CalibrationMethod met
 
 // The sigma of everything that is not held by the user, also where a strategy held it in turns.
 void widen_uncertainty(const CalibrationProblem& problem, Way& way) {
-  RefineProblem all{way.points,       way.model, way.X_WC, problem.fixed, shares_focal(problem, way),
-                    problem.residual, 0};
+  RefineProblem all{way.points,       way.model,      way.X_WC, problem.fixed, shares_focal(problem, way),
+                    problem.residual, problem.robust, 0};
   const RefineResult at = refine(all);
   if (at.uncertainty.parameters.empty()) {
     way.warnings.push_back("the sigmas hold for the image origin as it is: " + at.reason);

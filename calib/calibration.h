@@ -47,6 +47,8 @@ struct CalibrationProblem {
   CalibrationMethod method = CalibrationMethod::automatic;
   Refinement refinement = Refinement::automatic;
   Residual residual = Residual::reprojection;
+  double robust =
+      0;  // Cauchy's loss from about this many px on (sigmas, where covariances are given); 0: off
   ParameterSet fixed;          // held at the start's values (an origin without a start: at origin_px)
   bool one_focal = false;      // fx = fy
   bool search_origin = false;  // C5 also when the refinement would not ask for it

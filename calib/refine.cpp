@@ -212,8 +212,9 @@ double rounding_of(const RefineProblem& problem, const PointColumns& columns) {
 // A step is the last one when it promises to save next to nothing: what is then left to the minimum is the
 // square of that.
 Descent descend(const RefineProblem& problem, const PointColumns& columns, const Freedom& freedom,
-                const State& start) {
-  Descent at{start, normal_equations(columns, start.model, start.X_WC, problem.residual), 0, false};
+                const State& start, double robust) {
+  const Objective objective{problem.residual, robust};
+  Descent at{start, normal_equations(columns, start.model, start.X_WC, objective), 0, false};
   const double rounding = rounding_of(problem, columns);
   double damping = first_damping;
   while (at.equations.visible && at.iterations < problem.max_iterations) {
@@ -225,7 +226,7 @@ Descent descend(const RefineProblem& problem, const PointColumns& columns, const
     const double promised = step.dot(own.g);
     at.converged = promised <= last_step * at.equations.cost + rounding;
     State next = freedom.moved_by(at.state, own.scale.cwiseProduct(step));
-    NormalEquations there = normal_equations(columns, next.model, next.X_WC, problem.residual);
+    NormalEquations there = normal_equations(columns, next.model, next.X_WC, objective);
     const bool better = there.visible && there.cost <= at.equations.cost;
     if (better) {
       at.state = std::move(next);
@@ -239,6 +240,27 @@ Descent descend(const RefineProblem& problem, const PointColumns& columns, const
       at.converged = promised <= 1e-9 * at.equations.cost;
       break;
     }
+  }
+  return at;
+}
+
+// A robust loss has many minima: from one wide enough for every point down to the one wanted.
+Descent descend_robustly(const RefineProblem& problem, const PointColumns& columns, const Freedom& freedom,
+                         const State& start) {
+  constexpr double narrower = 0.5;
+  double robust = problem.robust;
+  if (robust > 0) {
+    const auto points = static_cast<double>(problem.points.size());
+    const NormalEquations first =
+        normal_equations(columns, start.model, start.X_WC, Objective{problem.residual, 0});
+    if (first.visible) robust = std::max(robust, 2 * std::sqrt(first.cost / points));
+  }
+  Descent at = descend(problem, columns, freedom, start, robust);
+  while (robust > problem.robust) {
+    robust = std::max(problem.robust, narrower * robust);
+    const int before = at.iterations;
+    at = descend(problem, columns, freedom, at.state, robust);
+    at.iterations += before;
   }
   return at;
 }
@@ -334,7 +356,7 @@ RefineResult refine(const RefineProblem& problem) {
   for (int round = 0; round < disc_rounds; ++round) {
     const double change = correct_discs(problem.points, at.state, columns);
     if (round > 0 && change < 1e-9) break;
-    at = descend(problem, columns, freedom, at.state);
+    at = descend_robustly(problem, columns, freedom, at.state);
     iterations += at.iterations;
   }
   if (!at.equations.visible)

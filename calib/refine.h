@@ -16,6 +16,7 @@ struct RefineProblem {
   ParameterSet fixed;      // parameters of the other lens model are always held
   bool one_focal = false;  // fx / fy held at the start's ratio
   Residual residual = Residual::reprojection;
+  double robust = 0;  // Cauchy's loss, in units of the whitened residual (px without covariances); 0: squares
   int max_iterations = 200;  // 0: only the cost and the uncertainty at the start
 };
 

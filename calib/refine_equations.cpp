@@ -122,7 +122,6 @@ void add_own(const Residuals<n>& a, const Column& w, NormalEquations& sum) {
     for (int j = 0; j <= i; ++j)
       sum.N(row, a.places[static_cast<std::size_t>(j)]) += (weighted * a.J.col(j)).sum();
   }
-  sum.cost += (w * a.r.square()).sum();
 }
 
 // The same for the covariance between the two residuals.
@@ -141,20 +140,32 @@ void add_mixed(const Residuals<n>& a, const Residuals<n>& b, const Column& w, No
       if (row <= column) sum.N(column, row) += product;
     }
   }
-  sum.cost += 2 * (w * a.r * b.r).sum();
 }
 
 template <int n>
 void add_both(const Residuals<n>& u, const Residuals<n>& v, const PointColumns& points, Eigen::Index first,
-              NormalEquations& sum) {
-  add_own(u, points.wuu.segment<block>(first), sum);
-  add_own(v, points.wvv.segment<block>(first), sum);
-  if (points.correlated) add_mixed(u, v, points.wuv.segment<block>(first), sum);
+              double robust, NormalEquations& sum) {
+  Column wuu = points.wuu.segment<block>(first), wvv = points.wvv.segment<block>(first);
+  Column wuv = points.wuv.segment<block>(first);
+  const Column square = wuu * u.r.square() + wvv * v.r.square() + 2 * wuv * u.r * v.r;
+  if (robust > 0) {
+    const double scale = robust * robust;
+    const Column trust = 1 / (1 + square / scale);
+    wuu *= trust;
+    wuv *= trust;
+    wvv *= trust;
+    sum.cost += scale * (1 + square / scale).log().sum();
+  } else {
+    sum.cost += square.sum();
+  }
+  add_own(u, wuu, sum);
+  add_own(v, wvv, sum);
+  if (points.correlated) add_mixed(u, v, wuv, sum);
 }
 
 template <class Lens>
 bool add_reprojection(const PointColumns& points, Eigen::Index first, const CameraModel& camera,
-                      const Lens& lens, const Pose& X_WC, NormalEquations& sum) {
+                      const Lens& lens, const Pose& X_WC, double robust, NormalEquations& sum) {
   constexpr int n = Lens::size + 8;
   const Seen seen(points, first, X_WC);
   if (!(seen.cz.minCoeff() > 0)) return false;
@@ -180,14 +191,14 @@ bool add_reprojection(const PointColumns& points, Eigen::Index first, const Came
                         -fx_z * (bent.xx * x + bent.xy * y));
   seen.add_pose_columns(v.J.rightCols(6), R, fy_z * bent.xy, fy_z * bent.yy,
                         -fy_z * (bent.xy * x + bent.yy * y));
-  add_both(u, v, points, first, sum);
+  add_both(u, v, points, first, robust, sum);
   return true;
 }
 
 // zc (u - Cx) - xc fx (1 + K r2), r2 of the observed point, and the same with v: spec 30 C6. The residuals
 // here are found minus predicted as above, so the derivatives have the opposite sign.
 bool add_algebraic(const PointColumns& points, Eigen::Index first, const CameraModel& camera, double K,
-                   const Pose& X_WC, NormalEquations& sum) {
+                   const Pose& X_WC, double robust, NormalEquations& sum) {
   constexpr int n = 11;
   const Seen seen(points, first, X_WC);
   if (!(seen.cz.minCoeff() > 0)) return false;
@@ -211,18 +222,20 @@ bool add_algebraic(const PointColumns& points, Eigen::Index first, const CameraM
     seen.add_pose_columns(rows.J.rightCols(6), R, is_u ? side : zero, is_u ? zero : side, depth);
     return rows;
   };
-  add_both(fill(X, seen.cx, camera.fx_px, true), fill(Y, seen.cy, camera.fy_px, false), points, first, sum);
+  add_both(fill(X, seen.cx, camera.fx_px, true), fill(Y, seen.cy, camera.fy_px, false), points, first, robust,
+           sum);
   return true;
 }
 
 bool add_block(const PointColumns& points, Eigen::Index first, const CameraModel& camera, const Pose& X_WC,
-               Residual residual, NormalEquations& sum) {
+               const Objective& objective, NormalEquations& sum) {
   if (const auto* division = std::get_if<Division>(&camera.distortion)) {
-    if (residual == Residual::algebraic) return add_algebraic(points, first, camera, division->K, X_WC, sum);
-    return add_reprojection(points, first, camera, DivisionLens(*division), X_WC, sum);
+    if (objective.residual == Residual::algebraic)
+      return add_algebraic(points, first, camera, division->K, X_WC, objective.robust, sum);
+    return add_reprojection(points, first, camera, DivisionLens(*division), X_WC, objective.robust, sum);
   }
   return add_reprojection(points, first, camera, BrownLens(std::get<BrownConrady>(camera.distortion)), X_WC,
-                          sum);
+                          objective.robust, sum);
 }
 
 }  // namespace
@@ -256,14 +269,14 @@ Eigen::Index lens_size(const CameraModel& camera) {
 }
 
 NormalEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
-                                 Residual residual) {
+                                 const Objective& objective) {
   const Eigen::Index size = 10 + lens_size(camera);
   NormalEquations sum;
   sum.N.setZero(size, size);
   sum.g.setZero(size);
   const Eigen::Index n = points.x_mm.size();
   for (Eigen::Index first = 0; first < n; first += block)
-    if (!add_block(points, first, camera, X_WC, residual, sum)) return sum;
+    if (!add_block(points, first, camera, X_WC, objective, sum)) return sum;
   sum.N.triangularView<Eigen::StrictlyUpper>() = sum.N.transpose();
   sum.visible = std::isfinite(sum.cost) && sum.g.allFinite();
   return sum;

@@ -31,8 +31,14 @@ struct NormalEquations {
   SmallMatrix N;         // J' J, both triangles
   SmallVector g;         // J' r, r = found - predicted
 };
+// What is minimised. robust > 0: Cauchy's loss robust^2 log(1 + r^2 / robust^2) of every point's whitened
+// residual r, with the weights of iteratively reweighted least squares.
+struct Objective {
+  Residual residual = Residual::reprojection;
+  double robust = 0;
+};
 NormalEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
-                                 Residual residual);
+                                 const Objective& objective);
 
 // Number of the lens' parameters: 1 or 5.
 Eigen::Index lens_size(const CameraModel& camera);

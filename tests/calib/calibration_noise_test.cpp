@@ -176,5 +176,28 @@ TEST(CalibrationNoise, WrongPointsAreRejectedAndNamed) {
   EXPECT_EQ(result.steps.front().name, "rejected points");
 }
 
+// With a quarter of the points wrong by 2..20 px least squares are off by pixels; the robust loss is not.
+TEST(CalibrationNoise, RobustLossBearsWrongPoints) {
+  const Scene scene;
+  std::mt19937_64 random(5);
+  auto points = test::photograph(scene.camera, scene.X_WC, scene.body, sigma_px, random);
+  std::uniform_real_distribution<double> off(2, 20), angle(0, 6.28);
+  for (std::size_t i = 0; i < points.size(); i += 4) {
+    const double size = off(random), direction = angle(random);
+    points[i].u_px += size * Eigen::Vector2d(std::cos(direction), std::sin(direction));
+  }
+  CalibrationProblem problem = options();
+  problem.points = points;
+  const CalibrationResult plain = calibrate(problem);
+  problem.robust = 0.3;
+  const CalibrationResult robust = calibrate(problem);
+  ASSERT_EQ(plain.status, CalibrationStatus::ok) << plain.reason;
+  ASSERT_EQ(robust.status, CalibrationStatus::ok) << robust.reason;
+  const VectorXd sigma = bound_of(scene).diagonal().cwiseSqrt();
+  EXPECT_GT(std::abs(plain.model.fx_px - scene.camera.fx_px), 10 * sigma(0));
+  EXPECT_LT(std::abs(robust.model.fx_px - scene.camera.fx_px), 4 * sigma(0));
+  EXPECT_LT(std::abs(robust.model.cx_px - scene.camera.cx_px), 4 * sigma(2));
+}
+
 }  // namespace
 }  // namespace zeropose
