@@ -3,7 +3,6 @@
 #include <arv.h>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <mutex>
@@ -111,11 +110,12 @@ struct GigeDevice::Handles {
   void require_set(double wanted, double got, std::string_view what) const;
   void set_packet_size(const NetworkInterface& interface);
   int tested_packet_bytes(const NetworkInterface& interface);
+  bool lost() const;
   void notice_silence() noexcept;
   void wait_until_quiet();
 
   CameraOptions options;
-  std::atomic<bool> lost = false;
+  bool found_lost = false;  // by our own questions
   Owner<ArvDevice> device;
   Owner<ArvCamera> camera;
   Owner<ArvStream> stream;
@@ -138,8 +138,6 @@ void GigeDevice::Handles::open(const NetworkInterface& interface) {
   Error error;
   device.reset(arv_gv_device_new(here.get(), there.get(), error.out()));
   require(error, "opening");
-  g_signal_connect(device.get(), "control-lost",
-                   G_CALLBACK(+[](ArvGvDevice*, std::atomic<bool>* flag) { *flag = true; }), &lost);
   if (!arv_gv_device_is_controller(ARV_GV_DEVICE(device.get()))) fail_in_use();
   camera.reset(arv_camera_new_with_device(device.get(), error.out()));
   require(error, "reading its features");
@@ -238,12 +236,26 @@ void GigeDevice::Handles::set_packet_size(const NetworkInterface& interface) {
          std::to_string(interface.mtu_bytes) + "; raise its MTU");
 }
 
+// Never connect a handler to the device's signal "control-lost". arv_gv_device_heartbeat_thread emits it
+// without holding a reference, and arv_gv_device_finalize waits for that thread: it may emit while the last
+// reference goes, most likely when we notice the same loss. With a handler connected g_signal_emit takes a
+// reference of its own: too late, and the object is already being finalized (g_object_ref fails, the emission
+// goes on with a null instance: SIGSEGV), or it is the last one, and the thread finalizes the device and
+// joins itself (abort). To disconnect first does not help: an emission that has begun goes on. Without a
+// handler, and without one of the class (ArvDeviceClass::control_lost is null), g_signal_emit_valist returns
+// before it touches the reference count, and the memory is there until finalize has joined the thread. So the
+// loss is asked for instead: the thread's last act is to make arv_gv_device_is_controller false, and reading
+// that takes no lock.
+bool GigeDevice::Handles::lost() const {
+  return found_lost || !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get()));
+}
+
 // Saves the seconds that a command to a device costs that is gone.
 void GigeDevice::Handles::notice_silence() noexcept {
   try {
-    if (!lost && !read_register(options.address, version_register, sign_of_life)) lost = true;
+    if (!lost() && !read_register(options.address, version_register, sign_of_life)) found_lost = true;
   } catch (const DeviceError&) {
-    lost = true;
+    found_lost = true;
   }
 }
 
@@ -259,27 +271,27 @@ void GigeDevice::Handles::wait_until_quiet() {
 }
 
 GigeDevice::GigeDevice(const CameraOptions& options) : handles_(std::make_unique<Handles>(options)) {
-  const NetworkInterface interface = interface_towards(options.address);
   if (!read_register(options.address, version_register, sign_of_life))
     handles_->fail("does not answer; check its power, cable and address");
   // Reading this register renews the controller's claim in some devices: not more often than a heartbeat.
   const auto privilege = read_register(options.address, control_privilege_register, sign_of_life);
   if ((privilege.value_or(0) & control_privilege_bits) != 0) handles_->fail_in_use();
+  NetworkInterface interface;
   {
     // The library reads a device's description with shared state and no lock: two at a time break it. Only
     // devices that just answered come here, so that none waits for a dead one.
     static std::mutex one_at_a_time;
     const std::lock_guard lock(one_at_a_time);
+    // As late as possible: arv_gv_device_finalize dereferences null when arv_gv_device_constructed could not
+    // bind to the interface's address, because it went away.
+    interface = interface_towards(options.address);
     handles_->open(interface);
   }
   handles_->configure();
   handles_->set_packet_size(interface);
 }
 
-GigeDevice::~GigeDevice() {
-  close_stream();
-  g_signal_handlers_disconnect_by_data(handles_->device.get(), &handles_->lost);
-}
+GigeDevice::~GigeDevice() { close_stream(); }
 
 void GigeDevice::open_stream() {
   Handles& own = *handles_;
@@ -302,8 +314,8 @@ void GigeDevice::close_stream() noexcept {
   if (!own.stream) return;
   Error error;
   own.notice_silence();
-  if (!own.lost) arv_camera_stop_acquisition(own.camera.get(), error.out());
-  if (!own.lost && !error) own.wait_until_quiet();
+  if (!own.lost()) arv_camera_stop_acquisition(own.camera.get(), error.out());
+  if (!own.lost() && !error) own.wait_until_quiet();
   own.closed_streams = statistics();
   own.stream.reset();
 }
@@ -325,7 +337,7 @@ void GigeDevice::trigger() {
 std::optional<ReceivedFrame> GigeDevice::receive(TimePoint deadline) {
   constexpr microseconds slice{100'000};  // between looks at the heartbeat
   ArvStream* stream = handles_->stream.get();
-  while (!handles_->lost) {
+  while (!handles_->lost()) {
     const auto left = std::chrono::duration_cast<microseconds>(deadline - steady_clock::now());
     const auto wait = std::clamp(left, microseconds{0}, slice);
     ArvBuffer* buffer = arv_stream_timeout_pop_buffer(stream, static_cast<guint64>(wait.count()));
@@ -342,12 +354,12 @@ std::optional<ReceivedFrame> GigeDevice::receive(TimePoint deadline) {
 void GigeDevice::require_control() {
   const auto privilege = read_register(handles_->options.address, control_privilege_register, sign_of_life);
   if (privilege && (*privilege & control_privilege_bits) != 0) return;
-  handles_->lost = true;
+  handles_->found_lost = true;
   if (!privilege) handles_->fail("does not answer; check its power and cable. It is used again when it does");
   handles_->fail("no longer knows us, so it was switched off in between; it is opened again");
 }
 
-bool GigeDevice::lost() const { return handles_->lost; }
+bool GigeDevice::lost() const { return handles_->lost(); }
 
 CameraStatistics GigeDevice::statistics() const {
   CameraStatistics current;
