@@ -244,8 +244,8 @@ void GigeDevice::Handles::set_packet_size(const NetworkInterface& interface) {
 // joins itself (abort). To disconnect first does not help: an emission that has begun goes on. Without a
 // handler, and without one of the class (ArvDeviceClass::control_lost is null), g_signal_emit_valist returns
 // before it touches the reference count, and the memory is there until finalize has joined the thread. So the
-// loss is asked for instead: the thread's last act is to make arv_gv_device_is_controller false, and reading
-// that takes no lock.
+// loss is asked for instead: after its emission the thread makes arv_gv_device_is_controller false, and
+// reading that takes no lock.
 bool GigeDevice::Handles::lost() const {
   return found_lost || !arv_gv_device_is_controller(ARV_GV_DEVICE(device.get()));
 }

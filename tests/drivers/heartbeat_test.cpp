@@ -20,7 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto patience = 10s;  // the heartbeat comes once a second, and asks anew after 0.5 s
-constexpr int read_no_references = -1;
+constexpr int none_held = -1;
 
 // What stands in the way of an emission of "control-lost".
 class Bar {
@@ -51,7 +51,7 @@ class Bar {
   // Of the device whose emission is held.
   int references() {
     const std::lock_guard lock(mutex_);
-    return held_ ? g_atomic_int_get(reinterpret_cast<int*>(&device_->ref_count)) : read_no_references;
+    return held_ ? g_atomic_int_get(reinterpret_cast<int*>(&device_->ref_count)) : none_held;
   }
 
   // Called by the heartbeat thread.
@@ -85,7 +85,7 @@ class Bar {
 std::atomic<Bar*> bar = nullptr;  // of the test under way
 thread_local bool before_the_bar = false;
 
-// One camera that another program's restart made forget us, and its device.
+// One camera and the device that controls it; switched off and on, the camera no longer knows us.
 class Heartbeat : public ::testing::Test {
  protected:
   Heartbeat() { bar = &bar_; }
