@@ -1,21 +1,16 @@
 #include "config/tables.h"
 
 #include <algorithm>
-#include <limits>
 #include <map>
 #include <set>
 
 #include "config/cameras.h"
 #include "config/csv.h"
+#include "config/table_columns.h"
 #include "config/text.h"
 
 namespace zeropose {
 namespace {
-
-constexpr double any = std::numeric_limits<double>::max();
-constexpr double above_zero = std::numeric_limits<double>::min();
-constexpr double largest_mm = 1e6;
-constexpr double largest_px = 1e6;
 
 Mark mark_of(CsvTable& table, std::size_t row) {
   Mark mark;
@@ -24,9 +19,9 @@ Mark mark_of(CsvTable& table, std::size_t row) {
                  table.number(row, "y_mm", -largest_mm, largest_mm),
                  table.number(row, "z_mm", -largest_mm, largest_mm)};
   mark.weight = table.number_or(row, "weight", 1, 0, 1);
-  mark.tolerance_px = table.number_or(row, "tolerance_px", no_tolerance, above_zero, any);
-  mark.tolerance_mm = table.number_or(row, "tolerance_mm", no_tolerance, above_zero, any);
-  mark.sigma_mm = table.number_or(row, "sigma_mm", 0, 0, any);
+  mark.tolerance_px = table.number_or(row, "tolerance_px", no_tolerance, above_zero, any_number);
+  mark.tolerance_mm = table.number_or(row, "tolerance_mm", no_tolerance, above_zero, any_number);
+  mark.sigma_mm = table.number_or(row, "sigma_mm", 0, 0, any_number);
   return mark;
 }
 
@@ -40,19 +35,6 @@ std::size_t index_of(CsvTable& table, std::size_t row, std::string_view column,
   if (!name.empty())
     table.add_mistake(row, column, in_quotes(name), concat({"the name of a ", column, " of the other file"}));
   return 0;
-}
-
-Eigen::Matrix2d covariance_of(CsvTable& table, std::size_t row) {
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Identity();
-  const bool none = table.is_blank(row, "suu") && table.is_blank(row, "svv") && table.is_blank(row, "suv");
-  if (none) return covariance;
-  const double suu = table.number(row, "suu", above_zero, largest_px);
-  const double svv = table.number(row, "svv", above_zero, largest_px);
-  const double suv = table.number(row, "suv", -largest_px, largest_px);
-  covariance << suu, suv, suv, svv;
-  if (suu > 0 && svv > 0 && suv * suv >= suu * svv)
-    table.add_mistake(row, "suv", std::to_string(suv), "suv^2 < suu svv: a covariance");
-  return covariance;
 }
 
 }  // namespace
@@ -81,8 +63,7 @@ std::vector<Observation> load_observations(const std::filesystem::path& path,
     Observation observation;
     observation.camera = index_of(table, row, "camera", cameras);
     observation.mark = index_of(table, row, "mark", marks);
-    observation.u_px = {table.number(row, "u_px", -largest_px, largest_px),
-                        table.number(row, "v_px", -largest_px, largest_px)};
+    observation.u_px = pixel_of(table, row);
     observation.covariance_px2 = covariance_of(table, row);
     const bool named = !table.is_blank(row, "camera") && !table.is_blank(row, "mark");
     if (named && !seen.emplace(table.text(row, "camera"), table.text(row, "mark")).second)
@@ -104,7 +85,7 @@ std::vector<PointPair> load_point_pairs(const std::filesystem::path& path) {
     PointPair pair;
     pair.p_A_mm = {coordinate(row, "xa"), coordinate(row, "ya"), coordinate(row, "za")};
     pair.p_B_mm = {coordinate(row, "xb"), coordinate(row, "yb"), coordinate(row, "zb")};
-    pair.weight = table.number_or(row, "weight", 1, 0, any);
+    pair.weight = table.number_or(row, "weight", 1, 0, any_number);
     pairs.push_back(pair);
   }
   table.throw_if_wrong();
