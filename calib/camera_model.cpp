@@ -41,6 +41,24 @@ std::optional<Bent> distort(const BrownConrady& lens, const Vector2d& u) {
   return bent;
 }
 
+using LensJacobian = Eigen::Matrix<double, 2, 5>;
+
+// Derivatives of the distorted point by K or k1 k2 p1 p2 k3; u has an image.
+LensJacobian by_lens(const Division& lens, const Vector2d& u) {
+  const double r2 = u.squaredNorm(), root = std::sqrt(1 - 4 * lens.K * r2);
+  LensJacobian J = LensJacobian::Zero();
+  J.col(0) = 4 * r2 / (root * (1 + root) * (1 + root)) * u;
+  return J;
+}
+
+LensJacobian by_lens(const BrownConrady&, const Vector2d& u) {
+  const double x = u.x(), y = u.y(), r2 = u.squaredNorm();
+  LensJacobian J;
+  J << r2 * x, r2 * r2 * x, 2 * x * y, r2 + 2 * x * x, r2 * r2 * r2 * x,  //
+      r2 * y, r2 * r2 * y, r2 + 2 * y * y, 2 * x * y, r2 * r2 * r2 * y;
+  return J;
+}
+
 std::optional<Vector2d> undistort(const Division& lens, const Vector2d& d) {
   const double bend = lens.K * d.squaredNorm();
   if (!(1 + bend > 0) || !(bend < 1)) return std::nullopt;
@@ -65,6 +83,25 @@ std::optional<Vector2d> undistort(const BrownConrady& lens, const Vector2d& d) {
 
 }  // namespace
 
+Internals internals_of(const CameraModel& camera) {
+  Internals internals = Internals::Zero();
+  internals.head<4>() << camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px;
+  if (const auto* brown = std::get_if<BrownConrady>(&camera.distortion))
+    internals.tail<5>() << brown->k1, brown->k2, brown->p1, brown->p2, brown->k3;
+  else
+    internals[4] = std::get<Division>(camera.distortion).K;
+  return internals;
+}
+
+CameraModel with_internals(CameraModel camera, const Internals& i) {
+  camera.fx_px = i[0], camera.fy_px = i[1], camera.cx_px = i[2], camera.cy_px = i[3];
+  if (std::holds_alternative<BrownConrady>(camera.distortion))
+    camera.distortion = BrownConrady{i[4], i[5], i[6], i[7], i[8]};
+  else
+    camera.distortion = Division{i[4]};
+  return camera;
+}
+
 std::optional<Projection> project_with_jacobian(const CameraModel& camera, const Eigen::Vector3d& p_CQ_mm) {
   if (!p_CQ_mm.allFinite() || !(p_CQ_mm.z() > 0)) return std::nullopt;
   const double inverse_z = 1 / p_CQ_mm.z();
@@ -77,6 +114,24 @@ std::optional<Projection> project_with_jacobian(const CameraModel& camera, const
   Projection projection;
   projection.u_px = focal.cwiseProduct(bent->d) + Vector2d(camera.cx_px, camera.cy_px);
   projection.du_dp = focal.asDiagonal() * (bent->d_du * du_dp);
+  return projection;
+}
+
+std::optional<FullProjection> project_with_all_jacobians(const CameraModel& camera,
+                                                         const Eigen::Vector3d& p_CQ_mm) {
+  if (!p_CQ_mm.allFinite() || !(p_CQ_mm.z() > 0)) return std::nullopt;
+  const double inverse_z = 1 / p_CQ_mm.z();
+  const Vector2d u = p_CQ_mm.head<2>() * inverse_z;
+  const auto bent = std::visit([&u](const auto& lens) { return distort(lens, u); }, camera.distortion);
+  if (!bent || !bent->d.allFinite()) return std::nullopt;
+  const Vector2d focal(camera.fx_px, camera.fy_px);
+  FullProjection projection;
+  projection.u_px = focal.cwiseProduct(bent->d) + Vector2d(camera.cx_px, camera.cy_px);
+  projection.du_dp.leftCols<2>() = inverse_z * (focal.asDiagonal() * bent->d_du);
+  projection.du_dp.col(2) = -(projection.du_dp.leftCols<2>() * u);
+  projection.du_di.leftCols<4>() << bent->d.x(), 0, 1, 0, 0, bent->d.y(), 0, 1;
+  projection.du_di.rightCols<5>() =
+      focal.asDiagonal() * std::visit([&u](const auto& lens) { return by_lens(lens, u); }, camera.distortion);
   return projection;
 }
 

@@ -44,10 +44,24 @@ struct Projection {
   Eigen::Matrix<double, 2, 3> du_dp;  // px per mm of p_CQ
 };
 
+// The internals as numbers: fx fy cx cy and then K 0 0 0 0 (division) or k1 k2 p1 p2 k3 (Brown).
+inline constexpr int internals_count = 9;
+using Internals = Eigen::Matrix<double, internals_count, 1>;
+Internals internals_of(const CameraModel& camera);
+CameraModel with_internals(CameraModel camera, const Internals& internals);
+
+struct FullProjection {
+  Eigen::Vector2d u_px;
+  Eigen::Matrix<double, 2, 3> du_dp;                // px per mm of p_CQ
+  Eigen::Matrix<double, 2, internals_count> du_di;  // by the internals, zero where the lens has none
+};
+
 // The pixel of the point p_CQ (mm, camera frame), or nullopt where it has no image: behind the camera,
 // outside the range in which the distortion is monotonic, or not finite. The pixel may lie outside the chip.
 std::optional<Eigen::Vector2d> project(const CameraModel& camera, const Eigen::Vector3d& p_CQ_mm);
 std::optional<Projection> project_with_jacobian(const CameraModel& camera, const Eigen::Vector3d& p_CQ_mm);
+std::optional<FullProjection> project_with_all_jacobians(const CameraModel& camera,
+                                                         const Eigen::Vector3d& p_CQ_mm);
 
 // The direction vector (x, y, 1) of a pixel in the camera frame, or nullopt outside the valid range of the
 // model.

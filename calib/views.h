@@ -1,8 +1,15 @@
-// Calibration of one camera or of a rig of cameras from several views of a board or body (spec 30,
-// "Multi-image").
+// Calibration of one camera, or of a rig of cameras together, from several views of a board or body whose
+// poses need not be known (spec 30, "Multi-image"). Start: Z. Zhang, "A flexible new technique for camera
+// calibration", 2000; then all parameters together by least squares (bundle adjustment).
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
 
 #include "calib/calibration.h"
 
@@ -13,5 +20,63 @@ struct ViewPoint {
   std::size_t view = 0, camera = 0;
   CalibrationPoint point;
 };
+
+struct ViewsCamera {
+  std::string name;
+  int width_px = 0, height_px = 0;
+  LensModel lens = LensModel::division;
+  std::optional<CameraModel> start;  // internals to begin with
+  ParameterSet fixed;      // internals held at the start's values; without one: origin in the image centre,
+                           // lens 0. The pose cannot be held.
+  bool one_focal = false;  // fx = fy
+};
+
+struct View {
+  std::string name;
+  std::optional<Pose> X_WB;  // known and held
+};
+
+// Frame W: that of the known poses X_WB; where none is known, the first camera (X_WC = identity).
+struct ViewsProblem {
+  std::span<const ViewsCamera> cameras;
+  std::span<const View> views;
+  std::span<const ViewPoint> points;
+  double sigma_px = 0;   // of one pixel coordinate, scales the covariances; 0: from the residuals
+  double reject_px = 0;  // points with a larger deviation are thrown out, worst first; 0: never
+  double loss_px = 0;    // Cauchy's loss, this many sigmas wide (with identity covariances: px); 0: none
+  int max_iterations = 100;
+  std::function<void(int iteration, double cost)> progress;  // cost: half the sum of squares
+};
+
+struct CameraEstimate {
+  CameraModel model;
+  Pose X_WC = Pose::Identity();
+  ParameterCovariance internals;              // of the free ones, in the order fx fy cx cy K | k1 k2 p1 p2 k3
+  Matrix6 pose_covariance = Matrix6::Zero();  // of the delta of moved(X_WC); zero for the frame W itself
+  double rms_px = 0;
+};
+
+struct ViewEstimate {
+  Pose X_WB = Pose::Identity();  // one camera and no known poses: X_CB
+  Matrix6 covariance = Matrix6::Zero();
+  double rms_px = 0;
+  std::size_t points_used = 0;
+};
+
+struct ViewsResult {
+  CalibrationStatus status = CalibrationStatus::failed;
+  std::string reason;                   // one sentence with the numbers, empty when ok
+  std::vector<CameraEstimate> cameras;  // empty unless ok, like views
+  std::vector<ViewEstimate> views;
+  double sigma_px = 0;      // of one coordinate: as given, or from the residuals
+  double rms_px = 0;        // root of the mean squared point distance, over the points used
+  double residual_sum = 0;  // weighted squares, over the points used
+  std::vector<CalibrationDeviation> deviations;  // in the order of the points
+  std::vector<std::size_t> rejected;             // in the order in which they were thrown out
+  int iterations = 0;
+  CalibrationDiagnosis diagnosis;
+};
+
+ViewsResult calibrate_views(const ViewsProblem& problem);
 
 }  // namespace zeropose
