@@ -1,0 +1,92 @@
+#include "views_scene.h"
+
+#include <opencv2/calib3d.hpp>
+
+namespace zeropose::test {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+namespace {
+
+// rd with rd / (1 + K rd^2) = ru, by halving an interval on which the left side rises.
+double distorted_radius(double K, double ru) {
+  double low = 0, high = K > 0 ? 1 / std::sqrt(K) : 2 * ru;
+  for (int step = 0; step < 200; ++step) {
+    const double middle = (low + high) / 2;
+    (middle / (1 + K * middle * middle) < ru ? low : high) = middle;
+  }
+  return (low + high) / 2;
+}
+
+Vector2d pixel_of(const CameraModel& camera, const Division& lens, const Vector3d& p) {
+  const Vector2d u = p.head<2>() / p.z();
+  const double ru = u.norm();
+  const Vector2d d = ru > 0 ? Vector2d(u * (distorted_radius(lens.K, ru) / ru)) : u;
+  return {camera.cx_px + camera.fx_px * d.x(), camera.cy_px + camera.fy_px * d.y()};
+}
+
+Vector2d pixel_of(const CameraModel& camera, const BrownConrady& lens, const Vector3d& p) {
+  const cv::Matx33d A(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
+  const std::vector<double> k{lens.k1, lens.k2, lens.p1, lens.p2, lens.k3};
+  const std::vector<cv::Point3d> points{{p.x(), p.y(), p.z()}};
+  std::vector<cv::Point2d> pixels;
+  cv::projectPoints(points, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), A, k, pixels);
+  return {pixels.front().x, pixels.front().y};
+}
+
+}  // namespace
+
+Vector2d independent_pixel(const CameraModel& camera, const Vector3d& p_CQ_mm) {
+  return std::visit([&](const auto& lens) { return pixel_of(camera, lens, p_CQ_mm); }, camera.distortion);
+}
+
+CameraModel camera_with(const Distortion& lens) { return {1280, 1024, 1503.2, 1498.7, 645.3, 498.1, lens}; }
+
+std::vector<Vector3d> board(int count, double pitch_mm, double depth_mm) {
+  Random random(5);
+  std::vector<Vector3d> points;
+  for (int row = 0; row < count; ++row)
+    for (int col = 0; col < count; ++col)
+      points.emplace_back(col * pitch_mm, row * pitch_mm, depth_mm > 0 ? uniform(random, 0, depth_mm) : 0);
+  return points;
+}
+
+ViewsScene scene_of(const std::vector<CameraModel>& models, const std::vector<Pose>& X_WC,
+                    const std::vector<Vector3d>& points, std::size_t views, double tilt_deg, Random& random) {
+  ViewsScene scene;
+  scene.models = models, scene.X_WC = X_WC;
+  for (std::size_t c = 0; c < models.size(); ++c) {
+    ViewsCamera camera;
+    camera.name = "camera" + std::to_string(c + 1);
+    camera.width_px = models[c].width_px, camera.height_px = models[c].height_px;
+    const bool brown = std::holds_alternative<BrownConrady>(models[c].distortion);
+    camera.lens = brown ? LensModel::brown : LensModel::division;
+    scene.cameras.push_back(camera);
+  }
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
+  for (std::size_t v = 0; v < views; ++v) {
+    const double rx = uniform(random, -tilt_deg, tilt_deg), ry = uniform(random, -tilt_deg, tilt_deg);
+    Pose X_WB = from_six_numbers({0, 0, 0, rx, ry, uniform(random, -180, 180)});
+    const Vector3d at(uniform(random, -100, 100), uniform(random, -80, 80), uniform(random, 700, 900));
+    X_WB.translation() = at - X_WB.linear() * middle;
+    scene.X_WB.push_back(X_WB);
+    scene.views.push_back({std::to_string(v + 1), std::nullopt});
+    for (std::size_t c = 0; c < models.size(); ++c)
+      for (const Vector3d& p : points) {
+        ViewPoint seen{v, c, {}};
+        seen.point.p_W_mm = p;
+        seen.point.u_px = independent_pixel(models[c], X_WC[c].inverse() * X_WB * p);
+        scene.points.push_back(seen);
+      }
+  }
+  return scene;
+}
+
+void add_noise(ViewsScene& scene, double sigma_px, Random& random) {
+  for (ViewPoint& seen : scene.points)
+    seen.point.u_px += Vector2d(normal(random, sigma_px), normal(random, sigma_px));
+}
+
+}  // namespace zeropose::test
