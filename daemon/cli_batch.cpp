@@ -14,6 +14,7 @@
 #include "config/text.h"
 #include "daemon/cli_answer.h"
 #include "daemon/cli_calibrate_views.h"
+#include "daemon/cli_find_board.h"
 #include "daemon/cli_help.h"
 #include "measure/pose.h"
 #include "protocol/conventions.h"
@@ -368,6 +369,7 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   CLI::App* calibrate = app.add_subcommand("calibrate", "Cameras from known points and their pixels");
   calibrate->require_subcommand(1);
   add_calibrate_views(*calibrate, exit_status);
+  add_find_board(app, exit_status);
 }
 
 }  // namespace zeropose

@@ -49,4 +49,23 @@ marks.csv                     found.csv
   hole, -525.6, -751.9, 200.9   left, hole, 401.25, 288.5
 Exit status: 0 done, 1 no answer (status, code and reason say why), 2 wrong usage or unreadable input.)";
 
+inline constexpr const char* find_board_help =
+    R"(Circles are measured to hundredths of a pixel, dark on light or light on dark; the board may be tilted by up to
+70 degrees, turned, unevenly lit and partly covered. Chessboards are given by their inner corners (one less than
+the squares, both ways) and must be seen as a whole.
+The board's frame: x along the columns, y along the rows, z away from the camera; row 0, column 0 is its origin.
+asymmetric-circles as in OpenCV: x = (2 col + row % 2) pitch, y = row pitch, so that neighbours in a row are two
+pitches apart. A symmetric board looks the same after half a turn (square: a quarter turn); then the origin is the
+corner nearest to the image's top left. equivalent_readings says how many there are. Where the board's frame must
+be the same in several images (linear stage, hand-eye, several cameras), use an asymmetric board with an odd number
+of rows, or do not turn the board.
+Hidden circles are listed in missing. When an outer row or column is hidden as a whole, nothing tells which part of
+the board is seen: no answer, unless --partial says that any part will do: then rows and columns are counted from
+the first one found. That suits views with unknown poses of the board and nothing else.
+u_px v_px is the centre of a circle's image, which is not the image of its centre when the board is tilted: give
+--diameter-mm, and the CSV gets the column radius_mm from which the calibration corrects this.
+Example: all there is for one view
+  zeropose find-board --image view1.png --rows 11 --cols 11 --pitch-mm 10 --diameter-mm 5 --csv view1.csv
+Exit status: 0 done, 1 no board found (with the reason), 2 wrong usage or unreadable input.)";
+
 }  // namespace zeropose::cli

@@ -44,18 +44,53 @@ void draw(cv::Mat& picture, const MarkOverlay& mark) {
   write_text(picture, text, corner + Eigen::Vector2d(4, 14), found ? green : red);
 }
 
-}  // namespace
-
-std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const MarkOverlay> marks) {
+cv::Mat colour_copy(const ImageView& image) {
   // OpenCV has no read-only view; the pixels are only read.
   const cv::Mat grey(image.height_px, image.width_px, CV_8UC1, const_cast<std::uint8_t*>(image.data),
                      static_cast<std::size_t>(image.stride_bytes));
   cv::Mat picture;
   cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
-  for (const auto& mark : marks) draw(picture, mark);
+  return picture;
+}
+
+std::vector<std::uint8_t> png_of(const cv::Mat& picture) {
   std::vector<std::uint8_t> png;
   cv::imencode(".png", picture, png);
   return png;
+}
+
+void draw(cv::Mat& picture, const BoardPoint& point) {
+  const Eigen::Vector2d across(3, 0), along(0, 3);
+  cv::line(picture, fixed(point.u_px - across), fixed(point.u_px + across), green, 1, cv::LINE_AA, sub_bits);
+  cv::line(picture, fixed(point.u_px - along), fixed(point.u_px + along), green, 1, cv::LINE_AA, sub_bits);
+  if (point.diameter_px > 0)
+    cv::circle(picture, fixed(point.u_px), static_cast<int>(point.diameter_px / 2 + 1) << sub_bits, green, 1,
+               cv::LINE_AA, sub_bits);
+  const std::string text = std::to_string(point.at.row) + "." + std::to_string(point.at.col);
+  const cv::Point corner(static_cast<int>(point.u_px.x()) + 4, static_cast<int>(point.u_px.y()) - 4);
+  cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, 0.3, cv::Scalar(0, 0, 0), 2, cv::LINE_AA);
+  cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, 0.3, green, 1, cv::LINE_AA);
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const MarkOverlay> marks) {
+  cv::Mat picture = colour_copy(image);
+  for (const auto& mark : marks) draw(picture, mark);
+  return png_of(picture);
+}
+
+std::vector<std::uint8_t> overlay_png(const ImageView& image, const BoardResult& board) {
+  cv::Mat picture = colour_copy(image);
+  for (std::size_t k = 1; k < board.points.size(); ++k) {
+    const BoardPoint &last = board.points[k - 1], &next = board.points[k];
+    const bool turn = last.at.row != next.at.row;
+    cv::line(picture, fixed(last.u_px), fixed(next.u_px), turn ? red : blue, 1, cv::LINE_AA, sub_bits);
+  }
+  for (const BoardPoint& point : board.points) draw(picture, point);
+  if (!board.reason.empty())
+    write_text(picture, board.reason, {4, 14}, board.status == BoardStatus::found ? blue : red);
+  return png_of(picture);
 }
 
 }  // namespace zeropose

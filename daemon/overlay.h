@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "measure/board.h"
 #include "measure/image.h"
 #include "measure/marks.h"
 
@@ -20,5 +21,9 @@ struct MarkOverlay {
 // PNG bytes: search areas in blue, found outlines and centres in green, what was not found in red with its
 // reason.
 std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const MarkOverlay> marks);
+
+// PNG bytes: the points of a board in green, each with row.column, joined in their order by blue lines (red
+// from one row to the next), and the reason, if there is one.
+std::vector<std::uint8_t> overlay_png(const ImageView& image, const BoardResult& board);
 
 }  // namespace zeropose

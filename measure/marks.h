@@ -43,10 +43,11 @@ struct MarkFinding {
   MarkStatus status = MarkStatus::not_searched;
   Eigen::Vector2d u_px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
-  double diameter_px = 0;  // longer axis
-  double axis_ratio = 0;   // shorter / longer axis
-  double contrast = 0;     // grey levels between mark and surroundings, positive
-  double quality = 0;      // 0..1: how well the model explains the pixels
+  double diameter_px = 0;                               // longer axis
+  double axis_ratio = 0;                                // shorter / longer axis
+  double contrast = 0;                                  // grey levels between mark and surroundings, positive
+  double quality = 0;                                   // 0..1: how well the model explains the pixels
+  Eigen::Matrix2d shape_px2 = Eigen::Matrix2d::Zero();  // the outline is x^T shape^-1 x = 1 about u_px
 };
 
 // Findings in the order of the searches. Pure and repeatable bit by bit. A mark may be up to 2.5 px + its
