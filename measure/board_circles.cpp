@@ -271,7 +271,8 @@ BoardResult find_circle_board(const ImageView& image, const BoardProblem& proble
     return refusal(BoardStatus::ambiguous,
                    words.count(on_board) + " on a grid of " + words.extent() + ", which fits the board of " +
                        size_text(problem.rows, problem.cols) + " in " + number(readings.best.size()) +
-                       " places: an outer row or column is hidden as a whole, or rows and columns are wrong" +
+                       " places: an outer row or column is hidden or outside the image, or the number of "
+                       "rows and columns is wrong" +
                        words.rejected(),
                    sight);
   return accept(problem, sight, readings);

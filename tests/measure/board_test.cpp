@@ -70,7 +70,7 @@ void expect_whole_board(const BoardScene& scene, const BoardResult& result) {
   EXPECT_LT(errors.chi2, 1.1 + room);
   EXPECT_GT(errors.chi2, 0.9 - room);
   EXPECT_LT(errors.worst_px, 6 * errors.rms_expected_px + 0.01);
-  RecordProperty("rms_px", std::to_string(errors.rms_px));
+  testing::Test::RecordProperty("rms_px", std::to_string(errors.rms_px));
 }
 
 // The same board read by a half or quarter turn: the scene whose first point is where the result's is.
@@ -92,34 +92,6 @@ BoardScene read_from(const BoardScene& scene, const BoardResult& result) {
     if (distance < nearest) nearest = distance, best = turned;
   }
   return best;
-}
-
-TEST(BoardPicture, CentroidOfACircleIsWhereTheTruthSaysItIs) {
-  BoardScene scene;
-  scene.rows = scene.cols = 3;
-  scene.pitch_mm = 40;
-  scene.diameter_mm = 16;
-  scene.camera = {300, 260, 600, 590, 160, 120, Division{-0.25}};
-  scene.X_CB = board_pose(scene, 330, 40 * degree, 0.5, 0.3);
-  scene.surroundings = scene.surface;
-  const auto picture = paint(scene);
-  for (int row = 0; row < 3; ++row) {
-    for (int col = 0; col < 3; ++col) {
-      const Vector2d seen = scene.seen_px({row, col});
-      double area = 0;
-      Vector2d first = Vector2d::Zero();
-      for (int v = int(seen.y()) - 22; v <= int(seen.y()) + 22; ++v) {
-        for (int u = int(seen.x()) - 22; u <= int(seen.x()) + 22; ++u) {
-          const double share = scene.surface - picture.grey[std::size_t(v * picture.width_px + u)];
-          area += share;
-          first += share * Vector2d(u, v);
-        }
-      }
-      // The centroid of a distorted disc is not the centre of its best ellipse; both agree to the second
-      // order of the lens across the disc.
-      EXPECT_LT((first / area - seen).norm(), 4e-3) << row << ' ' << col;
-    }
-  }
 }
 
 TEST(Board, FrontalElevenByEleven) {
@@ -158,7 +130,7 @@ TEST(Board, StrongDistortionOfBothSigns) {
     scene.camera = {768, 572, 780, 775, 392, 271, Division{K}};
     scene.pitch_mm = 12;
     scene.diameter_mm = 6;
-    scene.X_CB = board_pose(scene, K < 0 ? 230 : 190, 25 * degree, 1, 0.1);
+    scene.X_CB = board_pose(scene, 230, 25 * degree, 1, 0.1);
     const BoardResult result = find_board(picture_of(scene).view(), scene.problem());
     ASSERT_FALSE(result.points.empty()) << result.reason;
     expect_whole_board(read_from(scene, result), result);
@@ -167,12 +139,12 @@ TEST(Board, StrongDistortionOfBothSigns) {
 
 // The first point is the corner nearest to the top left pixel, and the reading is never mirrored.
 TEST(Board, TurnedByAnyAngle) {
-  for (int k = 0; k < 7; ++k) {
+  for (int k = 0; k < 4; ++k) {
     BoardScene scene;
     scene.camera = {480, 480, 800, 800, 240, 240, Division{0}};
     scene.rows = 7;
     scene.cols = 9;
-    scene.X_CB = board_pose(scene, 260, 15 * degree, 2.0, 0.1 + 0.9 * k);
+    scene.X_CB = board_pose(scene, 260, 15 * degree, 2.0, 0.1 + 1.7 * k);
     const BoardResult result = find_board(picture_of(scene).view(), scene.problem());
     ASSERT_FALSE(result.points.empty()) << result.reason;
     const BoardScene read = read_from(scene, result);

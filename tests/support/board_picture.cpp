@@ -34,7 +34,11 @@ class Plane {
     const double on_board =
         inside_rectangle(q, M, Vector2d::Constant(-s_.margin_mm), far_ + Vector2d::Constant(s_.margin_mm));
     double print = s_.kind == BoardKind::chessboard ? squares(q, M) : circle(q, M);
-    for (const auto& spot : s_.spots) print = std::max(print, disc(q - spot.centre_mm, M, spot.diameter_mm));
+    for (const auto& spot : s_.spots) {
+      const double near = spot.diameter_mm / 2 + s_.pitch_mm;
+      if ((q - spot.centre_mm).squaredNorm() > near * near) continue;
+      print = std::max(print, disc(q - spot.centre_mm, M, spot.diameter_mm));
+    }
     const double ground = s_.surroundings + on_board * (s_.surface - s_.surroundings);
     return ground + print * (s_.print - ground);
   }
