@@ -49,23 +49,25 @@ MarkSearch search_of(const ImageView& image, const BoardProblem& problem, bool d
   return search;
 }
 
-// The same disc taken up twice from different grey levels.
-bool known(const std::vector<MarkFinding>& discs, const MarkFinding& disc) {
+// The same disc may be taken up twice, from different grey levels.
+bool known(const std::vector<MarkFinding>& discs, const Vector2d& u_px) {
   return std::any_of(discs.begin(), discs.end(),
-                     [&](const MarkFinding& other) { return (other.u_px - disc.u_px).squaredNorm() < 1; });
+                     [&](const MarkFinding& disc) { return (disc.u_px - u_px).squaredNorm() < 1; });
 }
 
-Discs fit_all(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
-              EllipseWorkspace& workspace) {
-  Discs discs;
-  discs.dark = search.kind == MarkKind::dark_disc;
+// Adds what is new.
+void fit_all(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
+             EllipseWorkspace& workspace, Discs& discs) {
+  discs.saturated = discs.cut_off = 0;
   for (std::size_t k = 0; k < std::min(most_fits, seen.candidates.size()); ++k) {
-    const MarkFinding finding = fit_mark(image, search, seen.candidates[k].start, workspace);
+    const EllipseStart& start = seen.candidates[k].start;
+    if (known(discs.found, start.centre_px)) continue;
+    const MarkFinding finding = fit_mark(image, search, start, workspace, sharpened_model_share);
     discs.saturated += finding.status == MarkStatus::saturated ? 1 : 0;
     discs.cut_off += finding.status == MarkStatus::cut_off ? 1 : 0;
-    if (finding.status == MarkStatus::found && !known(discs.found, finding)) discs.found.push_back(finding);
+    if (finding.status == MarkStatus::found && !known(discs.found, finding.u_px))
+      discs.found.push_back(finding);
   }
-  return discs;
 }
 
 struct Sight {
@@ -78,6 +80,7 @@ class Look {
  public:
   Look(const ImageView& image, const BoardProblem& problem, bool dark)
       : image_(image), search_(search_of(image, problem, dark)) {
+    sight_.discs.dark = dark;
     take(finder_.first(image_, window(), search_));
   }
 
@@ -92,9 +95,8 @@ class Look {
  private:
   PixelWindow window() const { return {0, 0, image_.width_px - 1, image_.height_px - 1}; }
   void take(const CandidateSearch& seen) {
-    Sight sight{fit_all(image_, search_, seen, workspace_), {}};
-    sight.grid = find_grid(sight.discs.found, image_.width_px, image_.height_px);
-    if (sight.grid.points.size() >= sight_.grid.points.size()) sight_ = std::move(sight);
+    fit_all(image_, search_, seen, workspace_, sight_.discs);
+    sight_.grid = find_grid(sight_.discs.found, image_.width_px, image_.height_px);
   }
 
   ImageView image_;

@@ -6,7 +6,6 @@
 namespace zeropose {
 namespace {
 
-constexpr double model_share = 0.04;      // of the contrast: how far real edges are from the model, rms
 constexpr double noise_sigmas = 4;        // how far two variances of the same noise may differ
 constexpr double rough_px = 0.15;         // what the outline of a real mark may deviate from an ellipse, rms
 constexpr double most_noise_share = 0.3;  // of the contrast
@@ -30,14 +29,15 @@ MarkFinding finding_of(const EllipseFit& fit) {
   finding.contrast = std::abs(fit.background_grey - fit.mark_grey);
   const double noise = fit.flat_rms > 0 ? fit.flat_rms : 0.02 * finding.contrast;
   const double excess = std::max(0.0, fit.edge_rms * fit.edge_rms - noise * noise);
-  const double allowed = model_share * finding.contrast;
+  const double allowed = plain_model_share * finding.contrast;
   finding.quality = 1 / (1 + excess / (allowed * allowed));
   return finding;
 }
 
 // Residuals across the outline: noise as in the flat rings, and a small share of the contrast. And the
 // outline is where the region was.
-bool explains(const EllipseFit& fit, const MarkFinding& finding, const EllipseStart& start) {
+bool explains(const EllipseFit& fit, const MarkFinding& finding, const EllipseStart& start,
+              double model_share) {
   const double noise = std::min(fit.flat_rms, most_noise_share * finding.contrast);
   const double spread = std::sqrt(2 / fit.edge_count + 2 / std::max(1.0, fit.flat_count));
   const double model = model_share * finding.contrast;
@@ -53,7 +53,7 @@ bool explains(const EllipseFit& fit, const MarkFinding& finding, const EllipseSt
 }  // namespace
 
 MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
-                     EllipseWorkspace& workspace) {
+                     EllipseWorkspace& workspace, double model_share) {
   MarkFinding finding;
   finding.status = MarkStatus::cut_off;
   if (!band_in_image(image, start)) return finding;
@@ -64,7 +64,8 @@ MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const Ell
   const bool bright = fit.mark_grey > fit.background_grey;
   if (fit.saturated_share > saturated_share) {
     finding.status = MarkStatus::saturated;
-  } else if (!explains(fit, finding, start) || bright != (search.kind == MarkKind::bright_disc)) {
+  } else if (!explains(fit, finding, start, model_share) ||
+             bright != (search.kind == MarkKind::bright_disc)) {
     finding.status = MarkStatus::not_converged;
   } else if (finding.contrast < search.min_contrast) {
     finding.status = MarkStatus::low_contrast;

@@ -8,10 +8,15 @@
 
 namespace zeropose {
 
+// Of the contrast: how far the grey levels across the outline may be from the model, rms. Sharpening in the
+// camera and compressed pictures go beyond what plain optics leave; both sides of a disc alike, so that its
+// centre stays.
+inline constexpr double plain_model_share = 0.04, sharpened_model_share = 0.1;
+
 // The mark at the start's outline, or why it is none (the numbers are then of no use). Of the search the
 // kind, the limits of size and shape and the least contrast count; the window does not. Precondition: image
 // of at least 2 x 2 px.
 MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
-                     EllipseWorkspace& workspace);
+                     EllipseWorkspace& workspace, double model_share = plain_model_share);
 
 }  // namespace zeropose
