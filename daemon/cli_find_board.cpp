@@ -63,7 +63,8 @@ std::string table_of_points(const BoardResult& result, const Options& options) {
     text << std::setprecision(10) << point.p_B_mm.x() << ',' << point.p_B_mm.y() << ',' << point.p_B_mm.z()
          << ',' << std::fixed << std::setprecision(5) << point.u_px.x() << ',' << point.u_px.y()
          << std::scientific << std::setprecision(4) << ',' << point.covariance_px2(0, 0) << ','
-         << point.covariance_px2(1, 1) << ',' << point.covariance_px2(0, 1) << std::defaultfloat;
+         << point.covariance_px2(1, 1) << ',' << point.covariance_px2(0, 1) << std::defaultfloat
+         << std::setprecision(10);
     if (options.diameter_mm > 0) text << ',' << options.diameter_mm / 2;
     text << "\n";
   }

@@ -88,7 +88,8 @@ class FindBoard(unittest.TestCase):
                                overlay)
         self.assertEqual((status, err), (0, ""))
         self.assertIn("30 points", out)
-        rows = list(csv.DictReader(table.open()))
+        with table.open() as file:
+            rows = list(csv.DictReader(file))
         self.assertEqual(list(rows[0]), "x_mm y_mm z_mm u_px v_px suu svv suv radius_mm".split())
         self.assertEqual(len(rows), ROWS * COLS)
         self.assertEqual({float(row["radius_mm"]) for row in rows}, {3.4375})
