@@ -71,9 +71,8 @@ nlohmann::ordered_json camera_json(const CalibratedCamera& camera) {
 
 }  // namespace
 
-CalibratedCamera read_camera(JsonObject& camera) {
-  CalibratedCamera read;
-  CameraModel& model = read.model;
+CameraModel read_model(JsonObject& camera) {
+  CameraModel model;
   model.distortion = read_distortion(camera);
   camera.read("width", model.width_px, 1, largest_side_px);
   camera.read("height", model.height_px, 1, largest_side_px);
@@ -81,6 +80,12 @@ CalibratedCamera read_camera(JsonObject& camera) {
   camera.read("fy", model.fy_px, {0, largest_focal_length_px, true});
   camera.read("cx", model.cx_px, {-largest_origin_px, largest_origin_px});
   camera.read("cy", model.cy_px, {-largest_origin_px, largest_origin_px});
+  return model;
+}
+
+CalibratedCamera read_camera(JsonObject& camera) {
+  CalibratedCamera read;
+  read.model = read_model(camera);
   camera.read("X_WC", read.X_WC);
   return read;
 }
@@ -117,6 +122,8 @@ std::string cameras_text(const std::vector<CalibratedCamera>& cameras) {
             camera_json(camera).dump();
   return text + "\n}\n";
 }
+
+std::string camera_text(const CalibratedCamera& camera) { return camera_json(camera).dump(); }
 
 void save_cameras(const std::filesystem::path& path, const std::vector<CalibratedCamera>& cameras) {
   replace_file(path, cameras_text(cameras));

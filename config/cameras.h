@@ -22,9 +22,13 @@ std::vector<CalibratedCamera> parse_cameras(std::string_view text, const std::st
 std::vector<CalibratedCamera> read_cameras(JsonObject& cameras);
 // One camera without its name.
 CalibratedCamera read_camera(JsonObject& camera);
+// Its internals only.
+CameraModel read_model(JsonObject& camera);
 
 // The text of such a file. Internals round-trip exactly, poses to 1e-9 mm and 1e-12 rad (six numbers).
 std::string cameras_text(const std::vector<CalibratedCamera>& cameras);
+// One camera of such a file, without its name: "Camera JSON" of spec 92.
+std::string camera_text(const CalibratedCamera& camera);
 // Writes it atomically and keeps the previous file as path.previous. Throws std::system_error.
 void save_cameras(const std::filesystem::path& path, const std::vector<CalibratedCamera>& cameras);
 
