@@ -1,0 +1,21 @@
+// zeropose convert: poses and cameras in other systems' forms (spec 92).
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <optional>
+#include <string>
+
+#include "calib/rigid.h"
+
+namespace zeropose {
+
+void add_convert(CLI::App& app, int& exit_status);
+
+namespace cli {
+
+// The pose of an option's "x,y,z,rx,ry,rz"; nullopt where there is none. Throws ConfigError and
+// std::invalid_argument that name the option.
+std::optional<Pose> pose_of_option(const std::optional<std::string>& text, const std::string& option);
+
+}  // namespace cli
+}  // namespace zeropose
