@@ -1,6 +1,7 @@
 #include "config/camera_file.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "config/files.h"
 #include "config/json_reader.h"
@@ -18,27 +19,40 @@ bool is_one_camera(const JsonValue& tree) {
   });
 }
 
-CameraFile read_one(const JsonValue& tree, const std::string& file) {
+CameraFile read_one(JsonObject& camera) {
   CameraFile read;
+  read.camera.model = read_model(camera);
+  read.has_pose = camera.read_optional("X_WC", read.camera.X_WC);
+  return read;
+}
+
+std::vector<CameraFile> read_all(const JsonValue& tree, const std::string& file) {
+  std::vector<CameraFile> all;
   JsonReading reading(file);
-  read_object(tree, "", reading, [&](JsonObject& camera) {
-    read.camera.model = read_model(camera);
-    read.has_pose = camera.read_optional("X_WC", read.camera.X_WC);
+  read_object(tree, "", reading, [&](JsonObject& object) {
+    if (is_one_camera(tree)) {
+      all.push_back(read_one(object));
+      return;
+    }
+    object.read_members([&](const std::string& name, JsonObject& camera) {
+      all.push_back(read_one(camera));
+      all.back().camera.name = name;
+    });
   });
   reading.throw_if_wrong();
-  return read;
+  if (all.empty()) throw ConfigError({concat({file, ": found no camera, expected one"})});
+  return all;
 }
 
 }  // namespace
 
 CameraFile parse_camera(std::string_view text, const std::string& file, std::string_view name) {
-  const JsonValue tree = parse_json(text, file);
-  if (is_one_camera(tree)) return read_one(tree, file);
-  const std::vector<CalibratedCamera> cameras = parse_cameras(text, file);
+  const std::vector<CameraFile> all = read_all(parse_json(text, file), file);
+  if (all.size() == 1 && (name.empty() || all[0].camera.name.empty())) return all[0];
   std::string names;
-  for (const CalibratedCamera& camera : cameras) {
-    if (camera.name == name || (name.empty() && cameras.size() == 1)) return {camera, true};
-    names += concat({names.empty() ? "" : ", ", camera.name});
+  for (const CameraFile& one : all) {
+    if (one.camera.name == name) return one;
+    names += concat({names.empty() ? "" : ", ", one.camera.name});
   }
   if (name.empty())
     throw ConfigError({concat({file, ": found several cameras (", names, "), expected the name of one"})});
@@ -49,8 +63,10 @@ CameraFile load_camera(const std::filesystem::path& path, std::string_view name)
   return parse_camera(read_file(path), path.string(), name);
 }
 
-std::string camera_file_text(const CalibratedCamera& camera) {
-  return camera.name.empty() ? camera_text(camera) + "\n" : cameras_text({camera});
+std::string camera_file_text(const CameraFile& file) {
+  const std::string text = camera_text(file.camera, file.has_pose);
+  if (file.camera.name.empty()) return text + "\n";
+  return concat({"{\n  ", nlohmann::json(file.camera.name).dump(), ": ", text, "\n}\n"});
 }
 
 }  // namespace zeropose

@@ -123,7 +123,11 @@ std::string cameras_text(const std::vector<CalibratedCamera>& cameras) {
   return text + "\n}\n";
 }
 
-std::string camera_text(const CalibratedCamera& camera) { return camera_json(camera).dump(); }
+std::string camera_text(const CalibratedCamera& camera, bool with_pose) {
+  nlohmann::ordered_json json = camera_json(camera);
+  if (!with_pose) json.erase("X_WC");
+  return json.dump();
+}
 
 void save_cameras(const std::filesystem::path& path, const std::vector<CalibratedCamera>& cameras) {
   replace_file(path, cameras_text(cameras));

@@ -27,8 +27,8 @@ CameraModel read_model(JsonObject& camera);
 
 // The text of such a file. Internals round-trip exactly, poses to 1e-9 mm and 1e-12 rad (six numbers).
 std::string cameras_text(const std::vector<CalibratedCamera>& cameras);
-// One camera of such a file, without its name: "Camera JSON" of spec 92.
-std::string camera_text(const CalibratedCamera& camera);
+// One camera of such a file, without its name: "Camera JSON" of spec 92. Without its pose no cell takes it.
+std::string camera_text(const CalibratedCamera& camera, bool with_pose = true);
 // Writes it atomically and keeps the previous file as path.previous. Throws std::system_error.
 void save_cameras(const std::filesystem::path& path, const std::vector<CalibratedCamera>& cameras);
 

@@ -1,15 +1,22 @@
 #include "daemon/cli_convert.h"
 
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "calib/lens_conversion.h"
+#include "config/atomic_file.h"
+#include "config/camera_exchange.h"
+#include "config/camera_file.h"
 #include "config/csv.h"
+#include "config/files.h"
 #include "config/text.h"
 #include "daemon/cli_answer.h"
 #include "daemon/cli_help.h"
+#include "daemon/cli_output.h"
 #include "protocol/conventions.h"
 
 namespace zeropose {
@@ -111,6 +118,119 @@ void add_pose(CLI::App& convert_verb, int& exit_status) {
       [options, &exit_status] { exit_status = run([&] { return convert_pose(*options); }, options->json); });
 }
 
+// --- convert camera
+
+struct CameraOptions {
+  std::string from, to, name, file, output, model;
+  int width_px = 0, height_px = 0;
+  double max_residual_px = 0.05;
+  bool replace = false, json = false;
+};
+
+CameraFile read_camera_as(const CameraOptions& options, CameraFormat format) {
+  const std::string file = options.file.empty() ? "stdin" : options.file;
+  std::string text;
+  if (options.file.empty())
+    text.assign(std::istreambuf_iterator<char>(std::cin), {});
+  else
+    text = read_file(options.file);
+  if (format == CameraFormat::zeropose) return parse_camera(text, file, options.name);
+  return {parse_yaml_camera(text, file, {options.width_px, options.height_px}), false};
+}
+
+std::string camera_text_as(const CameraFile& file, CameraFormat format) {
+  const CalibratedCamera& camera = file.camera;
+  if (format == CameraFormat::opencv) return opencv_camera_text(camera.model);
+  if (format == CameraFormat::ros)
+    return ros_camera_text(camera.model, camera.name.empty() ? "camera" : camera.name);
+  return camera_file_text(file);
+}
+
+struct LensChange {
+  std::string refusal;  // empty: done
+  double worst_px = 0;
+};
+
+// The lens model that the format or the user wants.
+LensChange change_lens(const CameraOptions& options, CameraFormat to, CameraModel& model) {
+  const bool is_brown = std::holds_alternative<BrownConrady>(model.distortion);
+  const bool want_brown =
+      options.model.empty() ? is_brown || to != CameraFormat::zeropose : options.model == "brown";
+  if (is_brown == want_brown) return {};
+  const LensConversion conversion = want_brown ? to_brown(model) : to_division(model);
+  if (!conversion.model)
+    return {"the lens model has no image in some part of the chip: it cannot be converted"};
+  if (conversion.worst_px > options.max_residual_px)
+    return {concat({"the other lens model would be wrong by up to ", exact_text({&conversion.worst_px, 1}),
+                    " px, more than --max-residual-px ", exact_text({&options.max_residual_px, 1}),
+                    ": calibrate with --model ", want_brown ? "brown" : "division", " instead"})};
+  model = *conversion.model;
+  return {{}, conversion.worst_px};
+}
+
+Answer convert_camera(const CameraOptions& options) {
+  const CameraFormat from = *camera_format_named(options.from), to = *camera_format_named(options.to);
+  if (to != CameraFormat::zeropose && options.model == "division")
+    throw std::invalid_argument("--model division: opencv and ros files know the brown model only");
+  if (!options.output.empty()) refuse_existing(options.output, options.replace);
+  CameraFile read = read_camera_as(options, from);
+  CalibratedCamera& camera = read.camera;
+  if (from != CameraFormat::zeropose || to == CameraFormat::ros)
+    if (!options.name.empty()) camera.name = options.name;
+  const LensChange change = change_lens(options, to, camera.model);
+  if (!change.refusal.empty()) return failure(change.refusal);
+  Json warnings = Json::array();
+  if (change.worst_px > 0)
+    warnings.push_back(concat({"the lens model was replaced by the other one: wrong by up to ",
+                               exact_text({&change.worst_px, 1}), " px"}));
+  if (to != CameraFormat::zeropose && read.has_pose)
+    warnings.push_back("the pose X_WC has no place in this format and is left out");
+  const std::string text = camera_text_as(read, to);
+  for (const Json& warning : warnings) std::cerr << warning.get<std::string>() << '\n';
+  if (!options.output.empty()) replace_file(options.output, text);
+  Answer answer;
+  answer.text = options.output.empty() ? text : "";
+  answer.json = {{"status", "ok"},
+                 {"reason", ""},
+                 {"from", options.from},
+                 {"to", options.to},
+                 {"name", camera.name},
+                 {"camera", Json::parse(camera_text(camera, read.has_pose))},
+                 {"worst_px", change.worst_px},
+                 {"warnings", warnings},
+                 {"text", text}};
+  return answer;
+}
+
+void add_camera(CLI::App& convert_verb, int& exit_status) {
+  auto options = std::make_shared<CameraOptions>();
+  CLI::App* verb = convert_verb.add_subcommand("camera", "Converts a camera file: OpenCV, ROS, zeropose");
+  const CLI::IsMember formats({"opencv", "ros", "zeropose"});
+  verb->add_option("--from", options->from, "what the file is")->required()->check(formats);
+  verb->add_option("--to", options->to, "what is wanted")->required()->check(formats);
+  verb->add_option("FILE", options->file, "the camera file; without it stdin");
+  verb->add_option("--name", options->name, "which camera of a zeropose file; what to call it otherwise");
+  verb->add_option("--output", options->output, "the file to write; without it stdout");
+  verb->add_flag("--replace", options->replace, "overwrite --output; the old file is kept as .previous");
+  verb->add_option("--model", options->model,
+                   "the lens model wanted; without it as it is, or brown where only "
+                   "that exists")
+      ->check(CLI::IsMember({"division", "brown"}));
+  verb->add_option("--max-residual-px", options->max_residual_px,
+                   "refuse a lens model that is wrong by more than this somewhere in the image (0.05)")
+      ->check(CLI::Range(0.0, 100.0));
+  verb->add_option("--width", options->width_px, "image width, for files that do not state it")
+      ->check(CLI::Range(1, 65535));
+  verb->add_option("--height", options->height_px, "image height, for files that do not state it")
+      ->check(CLI::Range(1, 65535));
+  verb->add_flag("--json", options->json,
+                 "one JSON object on stdout: status, reason, camera, worst_px, warnings, text");
+  verb->footer(convert_camera_help);
+  verb->callback([options, &exit_status] {
+    exit_status = run([&] { return convert_camera(*options); }, options->json);
+  });
+}
+
 }  // namespace
 
 std::optional<Pose> cli::pose_of_option(const std::optional<std::string>& text, const std::string& option) {
@@ -119,9 +239,11 @@ std::optional<Pose> cli::pose_of_option(const std::optional<std::string>& text, 
 }
 
 void add_convert(CLI::App& app, int& exit_status) {
-  CLI::App* verb = app.add_subcommand("convert", "Converts poses between the conventions of robot makers");
+  CLI::App* verb = app.add_subcommand(
+      "convert", "Converts poses between robot makers' conventions, cameras between file formats");
   verb->require_subcommand(1);
   add_pose(*verb, exit_status);
+  add_camera(*verb, exit_status);
 }
 
 }  // namespace zeropose

@@ -33,6 +33,18 @@ Examples:
   zeropose convert pose --from zeropose --to fanuc --json < poses.csv
 Exit status: 0 done, 1 the numbers are no rotation, 2 wrong usage or unreadable input.)";
 
+inline constexpr const char* convert_camera_help =
+    R"(OpenCV: the YAML that cv::FileStorage and OpenCV's calibration samples write. ROS: camera_info YAML as
+camera_calibration writes it. zeropose: {"model": "division", ...}, or cameras by name. Pixel (0, 0) is the
+centre of the top-left pixel in all of them.
+OpenCV and ROS know the brown model (k1 k2 p1 p2 k3) only. A division model is replaced by the brown model that
+is nearest over the image; what that costs in px is said, and refused above --max-residual-px. Fisheye,
+rational and tilted models are refused. Their files have no pose.
+Examples:
+  zeropose convert camera --from opencv --to zeropose camera.yml --output camera.json
+  zeropose convert camera --from zeropose --to ros --name left cameras.json > left.yaml
+Exit status: 0 done, 1 the lens model cannot be converted, 2 wrong usage or unreadable input.)";
+
 inline constexpr const char* pose_help =
     R"(Marks that do not fit the others are removed and named; when the redundancy does not tell which one is wrong,
 there is no answer. suu svv suv is the covariance of the found pixel in px^2. Where it is not given it is that

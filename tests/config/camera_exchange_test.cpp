@@ -244,7 +244,7 @@ TEST(CameraExchange, DivisionMustBeConvertedBefore) {
 
 TEST(CameraFile, OneCameraOrSeveral) {
   const CalibratedCamera camera{"", brown, from_six_numbers({1, 2, 3, 10, 20, 30})};
-  const std::string one = camera_file_text(camera);
+  const std::string one = camera_file_text({camera, true});
   const CameraFile read = parse_camera(one, "one.json");
   expect_same(read.camera.model, brown);
   EXPECT_TRUE(read.has_pose);
@@ -252,18 +252,20 @@ TEST(CameraFile, OneCameraOrSeveral) {
   CalibratedCamera left = camera, right = camera;
   left.name = "left";
   right.name = "right";
-  EXPECT_EQ(parse_camera(camera_file_text(left), "left.json").camera.name, "left");
+  EXPECT_EQ(parse_camera(camera_file_text({left, true}), "left.json").camera.name, "left");
   const std::string both = cameras_text({left, right});
   EXPECT_EQ(parse_camera(both, "both.json", "right").camera.name, "right");
   EXPECT_THROW(parse_camera(both, "both.json"), ConfigError);
   EXPECT_THROW(parse_camera(both, "both.json", "middle"), ConfigError);
 }
 
-TEST(CameraFile, PoseMayBeAbsentInTheFileOfOneCamera) {
+TEST(CameraFile, PoseMayBeAbsent) {
   const std::string text =
       R"({"model":"division","width":768,"height":572,"fx":1,"fy":1,"cx":0,"cy":0,"K":0})";
   EXPECT_FALSE(parse_camera(text, "one.json").has_pose);
-  EXPECT_THROW(parse_camera("{\"left\": " + text + "}", "one.json"), ConfigError);
+  EXPECT_EQ(parse_camera("{\"left\": " + text + "}", "one.json").camera.name, "left");
+  EXPECT_EQ(camera_file_text(parse_camera(text, "one.json")).find("X_WC"), std::string::npos);
+  EXPECT_THROW(parse_cameras("{\"left\": " + text + "}", "cell"), ConfigError);  // a cell wants the pose
   EXPECT_THROW(parse_camera(replaced(text, "\"fx\":1,", ""), "one.json"), ConfigError);
   EXPECT_THROW(parse_camera("[]", "one.json"), ConfigError);
 }
