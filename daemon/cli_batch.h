@@ -1,4 +1,5 @@
-// The verbs that need no running daemon: check-config, pose, bestfit, convert pose (spec 92).
+// The verbs that need no running daemon: check-config, pose, bestfit, calibrate, convert (spec
+// 92).
 #pragma once
 
 #include <CLI/CLI.hpp>

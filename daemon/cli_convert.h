@@ -17,5 +17,8 @@ namespace cli {
 // std::invalid_argument that name the option.
 std::optional<Pose> pose_of_option(const std::optional<std::string>& text, const std::string& option);
 
+// The two numbers of an option's "CX,CY". Throws likewise.
+Eigen::Vector2d point_of_option(const std::string& text, const std::string& option);
+
 }  // namespace cli
 }  // namespace zeropose

@@ -1,0 +1,15 @@
+#include "daemon/cli_calibrate.h"
+
+#include "daemon/cli_calibrate_help.h"
+
+namespace zeropose {
+
+void add_calibrate(CLI::App& app, int& exit_status) {
+  CLI::App* verb = app.add_subcommand("calibrate", "Calibrates cameras; --help says which method when");
+  verb->require_subcommand(1);
+  verb->footer(cli::calibrate_help);
+  add_calibrate_points(*verb, exit_status);
+  add_calibrate_vanishing(*verb, exit_status);
+}
+
+}  // namespace zeropose
