@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 #include <sstream>
+#include <utility>
 
 #include "calib/comparison.h"
 #include "calib/data_sheet.h"
@@ -60,7 +61,7 @@ class Page {
     draw_plots();
     draw_notes();
     draw_list();
-    return svg_.page(page_width, std::ceil((y_ + margin) / page_height) * page_height);
+    return svg_.page(page_width, std::max(page_height, std::ceil(y_ + margin)));
   }
 
  private:
@@ -85,18 +86,25 @@ class Page {
   void draw_verdict() {
     const Verdict verdict = judge(report_.problem, report_.result);
     const double top = y_;
-    std::vector<std::pair<std::string, Quality>> lines;
-    for (const Finding& finding : verdict.findings)
-      for (const std::string& line : wrapped(finding.text, 112)) lines.emplace_back(line, finding.quality);
+    struct Line {
+      std::string text;
+      std::optional<Quality> mark;  // before the first line of a finding
+    };
+    std::vector<Line> lines;
+    for (const Finding& finding : verdict.findings) {
+      std::optional<Quality> mark = finding.quality;
+      for (std::string& line : wrapped(finding.text, 112))
+        lines.push_back({std::move(line), std::exchange(mark, std::nullopt)});
+    }
     const double height = 9 + 4 * static_cast<double>(lines.size());
     svg_.rectangle(margin, top, inner, height, {.fill = colour_of(verdict.quality), .opacity = 0.08});
     svg_.rectangle(margin, top, 1.6, height, {.fill = colour_of(verdict.quality)});
     svg_.text(margin + 5, top + 5.6, verdict.summary,
               {.size_mm = 3.6, .colour = colour_of(verdict.quality), .bold = true});
     y_ = top + 10.2;
-    for (const auto& [line, quality] : lines) {
-      svg_.circle(margin + 6, y_ - 0.9, 0.8, {.fill = colour_of(quality)});
-      svg_.text(margin + 8.5, y_, line, {.size_mm = 2.7});
+    for (const Line& line : lines) {
+      if (line.mark) svg_.circle(margin + 6, y_ - 0.9, 0.8, {.fill = colour_of(*line.mark)});
+      svg_.text(margin + 8.5, y_, line.text, {.size_mm = 2.7});
       y_ += 4;
     }
     y_ = top + height + 8;
@@ -161,9 +169,9 @@ class Page {
     }
     const DataSheet sheet = data_sheet(report_.result.model, report_.sy_mm);
     draw_row({{right, "focal length f"}, {right_end, concat({fixed_text(sheet.f_mm, 3), " mm"})}}, false);
-    draw_row({{right, "pixel pitch Sx"}, {right_end, concat({fixed_text(sheet.sx_mm * 1e3, 4), " um"})}},
+    draw_row({{right, "pixel pitch Sx"}, {right_end, concat({fixed_text(sheet.sx_mm * 1e3, 4), " µm"})}},
              false);
-    draw_row({{right, "pixel pitch Sy"}, {right_end, concat({fixed_text(sheet.sy_mm * 1e3, 4), " um"})}},
+    draw_row({{right, "pixel pitch Sy"}, {right_end, concat({fixed_text(sheet.sy_mm * 1e3, 4), " µm"})}},
              false);
     draw_row({{right, "k = K / f²"}, {right_end, concat({fixed_text(sheet.k_per_mm2, 7), " /mm²"})}}, false);
     draw_row({{right, "origin from centre"},
@@ -200,17 +208,19 @@ class Page {
              false);
     draw_row({{right, "camera turned"}, {right_end, concat({fixed_text(comparison.turned_deg, 4), " deg"})}},
              false);
-    for (const std::string& line :
-         wrapped(concat({"With pose: of points ", fixed_text(depth_mm, 0),
-                         " mm away. Small against the internals: the poses make up for each other."}),
-                 52)) {
+    for (const std::string& line : wrapped(
+             concat(
+                 {"With pose: of points ", fixed_text(depth_mm, 0),
+                  " mm away. Where this is small against the shift of the internals, the pose makes up for "
+                  "them."}),
+             52)) {
       svg_.text(right, y_, line, {.size_mm = 2.3, .colour = soft});
       y_ += 3.2;
     }
   }
 
   void draw_plots() {
-    const double room = 82;
+    const double room = 74;
     const PlotFrame image = image_frame({margin + 10, y_, 92, room}, report_.problem);
     draw_quiver(svg_, image, report_.problem, report_.result);
     draw_histogram(svg_, {margin + 120, y_, inner - 120, 28}, report_.result);
@@ -220,7 +230,7 @@ class Page {
 
   void draw_notes() {
     const double top = y_;
-    const PlotFrame image = image_frame({margin, y_, 66, 52}, report_.problem);
+    const PlotFrame image = image_frame({margin, y_, 66, 42}, report_.problem);
     draw_coverage(svg_, image, report_.problem, coverage_of(report_.problem, report_.result));
     const double x = margin + 76;
     y_ = top - 2;
@@ -275,7 +285,8 @@ class Page {
       const auto rows_left = static_cast<std::size_t>(std::max(0.0, (page_end - top - 5) / row_height));
       const std::size_t rest = order.size() - next, rows = std::min(rows_left, (rest + 1) / 2);
       if (rows > 2 || rest <= 2 * rows_left) {
-        for (const double x : {margin, margin + inner / 2 + 3}) next = draw_column(x, top, order, next, rows);
+        for (const double x : {margin, margin + inner / 2 + 3.0})
+          next = draw_column(x, top, order, next, rows);
         y_ = top + 5 + row_height * static_cast<double>(rows);
       }
       top = page_end + 2 * margin;
@@ -296,7 +307,7 @@ class Page {
 
   std::size_t draw_column(double x, double top, const std::vector<std::size_t>& order, std::size_t next,
                           std::size_t rows) {
-    constexpr double ends[] = {7, 20, 33, 45, 57, 69, 79, 89};
+    constexpr double ends[] = {6, 18, 30, 42, 54, 65, 77, 88};
     constexpr std::string_view heads[] = {"no.",      "u px",    "v px", "dev u px",
                                           "dev v px", "size px", "u mm", "v mm"};
     if (next >= order.size()) return next;

@@ -128,7 +128,7 @@ void draw_quiver(Svg& svg, const PlotFrame& outer, const CalibrationProblem& pro
   const PlotFrame frame = image_frame(outer, problem);
   draw_box(svg, frame, "Deviations over the image (found minus projected)");
   draw_image_axes(svg, frame, problem);
-  const double mm_per_px = 7 / typical_largest_px(result);
+  const double mm_per_px = (problem.points.size() > 100 ? 4.5 : 7) / typical_largest_px(result);
   svg.begin_clip(frame.x, frame.y, frame.width, frame.height);
   const Vector2d origin = on_page(frame, problem, {result.model.cx_px, result.model.cy_px});
   svg.line(origin.x() - 2.5, origin.y(), origin.x() + 2.5, origin.y(), {.stroke = grey, .width_mm = 0.3});
@@ -167,7 +167,7 @@ void draw_histogram(Svg& svg, const PlotFrame& frame, const CalibrationResult& r
         sum += value * value;
         largest = std::max(largest, std::abs(value));
       }
-  draw_box(svg, frame, "Histogram of the deviations");
+  draw_box(svg, frame, "Histogram");
   if (values.empty()) return;
   const auto n = static_cast<double>(values.size());
   const double sigma = std::max(std::sqrt(sum / n), 1e-12), reach = std::max(largest, 3 * sigma) * 1.001;
