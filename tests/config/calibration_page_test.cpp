@@ -21,7 +21,7 @@ struct Example {
   explicit Example(std::size_t count) {
     for (std::size_t i = 0; i < count; ++i) {
       CalibrationPoint point;
-      point.u_px = {10.0 + static_cast<double>(i * 7 % 780), 10.0 + static_cast<double>(i * 13 % 580)};
+      point.u_px = {10.0 + static_cast<double>(i * 137 % 780), 10.0 + static_cast<double>(i * 211 % 580)};
       points.push_back(point);
       result.deviations.push_back(
           {{0.125, -0.25}, {0.05, -0.1}, 800.0 + static_cast<double>(i % 100), i != 4});
