@@ -3,7 +3,6 @@
 the formulas of spec 20, published measurements, wrong inputs. Usage: cli_calibrate_test.py ZEROPOSE SOURCE_DIR"""
 import json
 import math
-import os
 import pathlib
 import random
 import subprocess
@@ -196,11 +195,8 @@ class Points(Case):
         self.assertEqual(self.path("camera.json.previous").read_text(), before)
 
     def test_published_measurement(self):
-        """27 balls of Table 4.2; the fixed origin and result of Table 4.3 (spec data, see its README)."""
-        data = pathlib.Path(os.environ.get("ZEROPOSE_DATA", SOURCE.parent / "shared/data"))
-        table = data / "dissertation/ball-27.csv"
-        if not table.exists():
-            self.skipTest("skipped: data not found")
+        """27 balls of Table 4.2; the fixed origin and result of Table 4.3 (tests/golden/README.md)."""
+        table = SOURCE / "tests/golden/ball-27.csv"
         lines = [line.split(",") for line in table.read_text().split()]
         rows = ["x_mm,y_mm,z_mm,u_px,v_px"] + [
             ",".join([x, y, z, repr(float(u) + 384), repr(float(v) + 286)]) for u, v, x, y, z in lines[1:]]
