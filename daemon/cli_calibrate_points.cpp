@@ -27,7 +27,7 @@ struct PointsOptions {
   std::optional<double> tz_mm;
   std::vector<std::string> fix;
   int width_px = 0, height_px = 0;
-  double reject_px = 0, reject_mm = 0, sigma_px = 0, pitch_mm = 0, frame_offset_z_mm = 0;
+  double reject_px = 0, reject_mm = 0, sigma_px = 0, robust = 0, pitch_mm = 0, frame_offset_z_mm = 0;
   bool search_origin = false, one_focal = false, replace = false, json = false;
 };
 
@@ -108,6 +108,7 @@ std::unique_ptr<PointsInput> input_of(const PointsOptions& options) {
   problem.reject_px = options.reject_px;
   problem.reject_mm = options.reject_mm;
   problem.sigma_px = options.sigma_px;
+  problem.robust = options.robust;
   if (options.origin) problem.origin_px = point_of_option(*options.origin, "--origin");
   return input;
 }
@@ -171,6 +172,9 @@ void add_problem_options(CLI::App& verb, PointsOptions& options) {
       ->check(CLI::Range(0.0, 1e6));
   verb.add_flag("--one-focal", options.one_focal, "fx = fy");
   verb.add_option("--sigma-px", options.sigma_px, "noise of one pixel coordinate")
+      ->check(CLI::Range(0.0, 1e3));
+  verb.add_option("--robust", options.robust,
+                  "Cauchy's loss from this many px (or sigmas) on: wrong points pull less")
       ->check(CLI::Range(0.0, 1e3));
   verb.add_option("--tz-mm", options.tz_mm, "distance of a board parallel to the chip")
       ->check(CLI::Range(1e-3, 1e6));
