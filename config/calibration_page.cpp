@@ -173,7 +173,9 @@ class Page {
              false);
     draw_row({{right, "pixel pitch Sy"}, {right_end, concat({fixed_text(sheet.sy_mm * 1e3, 4), " µm"})}},
              false);
-    draw_row({{right, "k = K / f²"}, {right_end, concat({fixed_text(sheet.k_per_mm2, 7), " /mm²"})}}, false);
+    if (std::holds_alternative<Division>(report_.result.model.distortion))
+      draw_row({{right, "k = K / f²"}, {right_end, concat({fixed_text(sheet.k_per_mm2, 7), " /mm²"})}},
+               false);
     draw_row({{right, "origin from centre"},
               {right_end, concat({fixed_text(sheet.origin_from_centre_px.x(), 2), ", ",
                                   fixed_text(sheet.origin_from_centre_px.y(), 2), " px"})}},
@@ -241,6 +243,11 @@ class Page {
            concat({step.name, step.detail.empty() ? "" : ": ", step.detail, " (RMS ",
                    fixed_text(step.rms_px, 3), " px)"}),
            dark);
+    for (const auto& [limit, unit] :
+         {std::pair(report_.problem.reject_px, " px"), {report_.problem.reject_mm, " mm"}})
+      if (limit > 0)
+        note(x, concat({"Points that deviate by more than ", number_text(limit), unit, " are rejected."}),
+             soft);
     note(x, concat({"Condition of the normal equations: ", number_text(report_.result.diagnosis.condition)}),
          soft);
     y_ += 3;

@@ -112,7 +112,7 @@ Vector2d on_page(const PlotFrame& frame, const CalibrationProblem& problem, cons
 void draw_image_axes(Svg& svg, const PlotFrame& frame, const CalibrationProblem& problem) {
   draw_x_axis(svg, frame, -0.5, problem.width_px - 0.5, "u, px");
   draw_y_axis(svg, frame, -0.5, problem.height_px - 0.5, true);
-  svg.text(frame.x - 8.5, frame.y + frame.height / 2, "v, px",
+  svg.text(frame.x - 9.6, frame.y + frame.height / 2, "v, px",
            {.size_mm = 2.4, .anchor = "middle", .turn_deg = -90});
 }
 
