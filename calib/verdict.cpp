@@ -76,12 +76,16 @@ Finding judge_fit(const CalibrationProblem& problem, const CalibrationResult& re
       std::string("the points fit within ").append(number(result.rms_px, 3)).append(" px RMS");
   if (!(problem.sigma_px > 0))
     return {at_most(result.rms_px, rms_px_limit), rms + "; the noise of the points was not stated"};
-  // Of 2 n residuals of variance sigma^2 the parameters take their share away.
-  const double equations = 2.0 * static_cast<double>(used_count(result));
-  const double expected_px = problem.sigma_px * std::sqrt(2 * std::max(1, redundancy_of(result)) / equations);
+  // Of 2 n residuals of this variance the parameters take their share away.
+  double variance = 0;
+  for (std::size_t i = 0; i < std::min(problem.points.size(), result.deviations.size()); ++i)
+    if (result.deviations[i].used) variance += problem.points[i].covariance_px2.trace() / 2;
+  const double n = std::max(1.0, static_cast<double>(used_count(result)));
+  const double noise_px = problem.sigma_px * std::sqrt(variance / n);
+  const double expected_px = noise_px * std::sqrt(std::max(1, redundancy_of(result)) / n);
   const double ratio = result.rms_px / expected_px;
   return {at_most(ratio, noise_ratio), rms + ", " + number(ratio, 1) + " times what the stated noise of " +
-                                           number(problem.sigma_px, 3) + " px leaves"};
+                                           number(noise_px, 3) + " px leaves"};
 }
 
 Finding judge_redundancy(const CalibrationResult& result) {

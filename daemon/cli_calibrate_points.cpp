@@ -87,7 +87,13 @@ std::unique_ptr<PointsInput> input_of(const PointsOptions& options) {
   input->points = load_calibration_points(options.points);
   problem.points = input->points;
   read_start(options, problem);
-  if (!options.active.empty()) input->active = load_camera(options.active, options.name).camera;
+  if (!options.active.empty()) {
+    const CameraFile active = load_camera(options.active, options.name);
+    if (!active.has_pose)
+      throw ConfigError(
+          {concat({options.active, ": found no X_WC, expected it: a camera in use has a pose"})});
+    input->active = active.camera;
+  }
   if (!options.model.empty())
     problem.lens = options.model == "brown" ? LensModel::brown : LensModel::division;
   problem.method = chosen<CalibrationMethod>(options.method, {{"auto", CalibrationMethod::automatic},

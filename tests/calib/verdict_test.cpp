@@ -159,6 +159,9 @@ TEST(Verdict, ResidualsAgainstTheNoise) {
   EXPECT_THAT(example.first_finding(), HasSubstr("2.1 times"));
   example.result.rms_px = 0.5;
   EXPECT_EQ(example.quality(), Quality::not_usable);
+  // Noisier points may have larger residuals: 0.1 px times 4.
+  for (CalibrationPoint& point : example.points) point.covariance_px2 *= 16;
+  EXPECT_EQ(example.quality(), Quality::good);
   // Without a stated noise only the size counts.
   example.problem.sigma_px = 0;
   EXPECT_EQ(example.quality(), Quality::good);

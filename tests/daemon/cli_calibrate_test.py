@@ -229,6 +229,8 @@ class Points(Case):
         self.expect_refused(run(*verb, *self.SIZE, "--origin", "1,2,3"), "--origin: found 3 numbers, expected 2")
         self.expect_refused(run(*verb, *self.SIZE, "--method", "magic"), "--method")
         self.expect_refused(run(*verb, *self.SIZE, "--start", "/no/file"), "/no/file: found no such file")
+        poseless = self.write("poseless.json", json.dumps({k: v for k, v in CAMERA.items() if k != "X_WC"}))
+        self.expect_refused(run(*verb, *self.SIZE, "--active", poseless), "poseless.json: found no X_WC")
         self.expect_refused(run("calibrate", "points", "--points", self.write("a.csv", "x_mm\n1\n"), *self.SIZE), "a.csv:1: found no column")
 
 
