@@ -40,7 +40,7 @@ TEST(LensConversion, DivisionToBrown) {
 TEST(LensConversion, FirstOrderIsK) {
   CameraModel camera = narrow;
   camera.distortion = Division{1e-3};
-  const auto& brown = std::get<BrownConrady>(to_brown(camera).model->distortion);
+  const auto brown = std::get<BrownConrady>(to_brown(camera).model->distortion);
   EXPECT_NEAR(brown.k1, 1e-3, 1e-8);
   EXPECT_EQ(brown.p1, 0);
 }
