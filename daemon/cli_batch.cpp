@@ -13,10 +13,9 @@
 #include "config/tables.h"
 #include "config/text.h"
 #include "daemon/cli_answer.h"
-#include "daemon/cli_calibrate_views.h"
-#include "daemon/cli_find_board.h"
 #include "daemon/cli_calibrate.h"
 #include "daemon/cli_convert.h"
+#include "daemon/cli_find_board.h"
 #include "daemon/cli_help.h"
 #include "measure/pose.h"
 
@@ -264,9 +263,6 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_bestfit(app, exit_status);
   add_calibrate(app, exit_status);
   add_convert(app, exit_status);
-  CLI::App* calibrate = app.add_subcommand("calibrate", "Cameras from known points and their pixels");
-  calibrate->require_subcommand(1);
-  add_calibrate_views(*calibrate, exit_status);
   add_find_board(app, exit_status);
 }
 

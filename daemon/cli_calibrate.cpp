@@ -1,6 +1,7 @@
 #include "daemon/cli_calibrate.h"
 
 #include "daemon/cli_calibrate_help.h"
+#include "daemon/cli_calibrate_views.h"
 
 namespace zeropose {
 
@@ -9,6 +10,7 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   verb->require_subcommand(1);
   verb->footer(cli::calibrate_help);
   add_calibrate_points(*verb, exit_status);
+  add_calibrate_views(*verb, exit_status);
   add_calibrate_vanishing(*verb, exit_status);
 }
 
