@@ -4,6 +4,9 @@ find_package(Threads REQUIRED)
 add_library(zeropose_flags INTERFACE)
 target_include_directories(zeropose_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(zeropose_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Werror)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  target_compile_options(zeropose_flags INTERFACE -fpch-preprocess)  # for ccache
+endif()
 if(ZEROPOSE_SANITIZE)
   target_compile_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE} -fno-sanitize-recover=all
                          -fno-omit-frame-pointer)
@@ -14,9 +17,12 @@ if(ZEROPOSE_SANITIZE)
   endif()
 endif()
 
-# zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME.
+# zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME. PRECOMPILED: the group of headers it begins with.
 function(zeropose_room name)
-  cmake_parse_arguments(ROOM "" "" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
+  cmake_parse_arguments(ROOM "" "PRECOMPILED" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
   add_library(zeropose_${name} STATIC ${ROOM_SOURCES})
   target_link_libraries(zeropose_${name} PUBLIC zeropose_flags ${ROOM_LINK} PRIVATE ${ROOM_PRIVATE_LINK})
+  if(ROOM_PRECOMPILED)
+    zeropose_precompile(zeropose_${name} ${ROOM_PRECOMPILED})
+  endif()
 endfunction()
