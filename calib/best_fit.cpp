@@ -1,9 +1,10 @@
 #include "calib/best_fit.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+
+#include "calib/symmetric_eigen.h"
 
 namespace zeropose {
 namespace {
@@ -39,8 +40,8 @@ Moments moments_of(std::span<const PointPair> pairs) {
 }
 
 bool is_line(const Matrix3d& spread) {
-  const Vector3d squares = Eigen::JacobiSVD<Matrix3d>(spread).singularValues();
-  return !(squares(1) > collinear_ratio * collinear_ratio * squares(0));
+  const Vector3d squares = symmetric_eigen(spread).values;
+  return !(squares(1) > collinear_ratio * collinear_ratio * squares(2));
 }
 
 // For unit variance of a coordinate of weight 1: a point moves by dt + w x (R p_B).

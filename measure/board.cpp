@@ -5,7 +5,6 @@
 #include "measure/board_circles.h"
 #include "measure/board_place.h"
 #include "measure/chessboard.h"
-#include "measure/words.h"
 
 namespace zeropose {
 namespace {

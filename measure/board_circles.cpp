@@ -12,7 +12,6 @@
 #include "measure/board_place.h"
 #include "measure/mark_candidates.h"
 #include "measure/mark_fit.h"
-#include "measure/words.h"
 
 namespace zeropose {
 namespace {

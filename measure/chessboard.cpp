@@ -8,7 +8,6 @@
 
 #include "measure/chessboard_corners.h"
 #include "measure/saddle_fit.h"
-#include "measure/words.h"
 
 namespace zeropose {
 namespace {

@@ -7,6 +7,7 @@
 
 #include "calib/eccentricity.h"
 #include "calib/words.h"
+#include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
@@ -98,9 +99,10 @@ class Relaxation {
       g += weighted * glance->gap_px;
     }
     // Cameras that look along the same line leave the depth open: then the smallest step.
-    Eigen::FullPivLU<Eigen::Matrix3d> lu(N);
-    if (lu.rcond() > 1e-9) return problem_.alpha * lu.solve(g);
-    return problem_.alpha * (N + 1e-9 * N.trace() * Eigen::Matrix3d::Identity()).inverse() * g;
+    const SmallCholesky<3> cholesky(N);
+    if (cholesky.ok() && condition_of(N, cholesky.inverse()) < 1e9) return problem_.alpha * cholesky.solve(g);
+    const Eigen::Matrix3d smallest = 1e-9 * N.trace() * Eigen::Matrix3d::Identity();
+    return problem_.alpha * SmallCholesky<3>(N + smallest).solve(g);
   }
 
   const CompensationProblem& problem_;

@@ -1,12 +1,13 @@
 #include "measure/ellipse_fit.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "measure/ellipse_model.h"
+#include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
@@ -60,10 +61,10 @@ Taken flat_rings(const EllipseBand& band, const State& state) {
   for (std::size_t k = 0; k < taken.size(); ++k) {
     const FlatRing& ring = band.rings[k];
     if (ring.count() < 16) continue;
-    const Eigen::LDLT<Eigen::Matrix3d> solver(ring.ee);
+    const SmallCholesky<3> solver(ring.ee);
     plane[k] = solver.solve(ring.ge);
     variance[k] = std::max(ring.squares(plane[k]), 0.0) / (ring.count() - 3);
-    taken[k] = solver.info() == Eigen::Success && plane[k].allFinite();
+    taken[k] = solver.ok() && plane[k].allFinite();
     if (taken[k]) quietest = std::min(quietest, variance[k]);
   }
   const double contrast = std::abs(state.at(background) - state.at(mark));
@@ -84,10 +85,13 @@ void add_rings(const EllipseBand& band, const Taken& taken, const State& state, 
   }
 }
 
+// Not finite, so not plausible, where the pixels leave a direction open.
 Unknowns step_from(const Normal& normal, double lambda) {
   Information N = normal.N;
   N.diagonal() *= 1 + lambda;
-  return N.ldlt().solve(normal.g);
+  const SmallCholesky<unknowns> solver(N);
+  if (!solver.ok()) return Unknowns::Constant(std::numeric_limits<double>::quiet_NaN());
+  return solver.solve(normal.g);
 }
 
 double variance_of(const Normal& normal) {
@@ -216,11 +220,8 @@ EllipseFit report(const Descent& d) {
   const EllipseBand& band = d.band;
   EllipseFit fit;
   fit.iterations = d.iterations;
-  const Eigen::LDLT<Information> solver(d.normal.N);
-  Eigen::Matrix<double, unknowns, 2> unit = Eigen::Matrix<double, unknowns, 2>::Zero();
-  unit(cu, 0) = unit(cv, 1) = 1;
-  const Eigen::Matrix2d inverse = solver.solve(unit).topRows<2>();
-  fit.covariance_px2 = 0.5 * variance_of(d.normal) * (inverse + inverse.transpose());
+  const SmallCholesky<unknowns> solver(d.normal.N);
+  fit.covariance_px2 = variance_of(d.normal) * solver.inverse().topLeftCorner<2, 2>();
   fit.centre_px = d.state.at.head<2>() + Eigen::Vector2d(band.origin_u, band.origin_v);
   fit.shape_px2 = d.state.shape();
   const double light = 1 + d.state.at(gx) * d.state.at(cu) + d.state.at(gy) * d.state.at(cv);
@@ -234,8 +235,8 @@ EllipseFit report(const Descent& d) {
   fit.edge_rms = std::sqrt(std::max(0.0, d.normal.squares - flat_squares) / fit.edge_count);
   judge_outline(d, fit);
   fit.saturated_share = band.saturated / fit.edge_count;
-  fit.converged = solver.info() == Eigen::Success && fit.covariance_px2.allFinite() &&
-                  fit.covariance_px2.determinant() > 0 && fit.covariance_px2(0, 0) > 0;
+  fit.converged = solver.ok() && fit.covariance_px2.allFinite() && fit.covariance_px2.determinant() > 0 &&
+                  fit.covariance_px2(0, 0) > 0;
   return fit;
 }
 

@@ -1,9 +1,9 @@
 #include "measure/pose.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "calib/symmetric_eigen.h"
 #include "calib/words.h"
 #include "measure/pose_rejection.h"
 #include "measure/pose_solver.h"
@@ -145,7 +145,7 @@ std::string why_degenerate(const PoseModel& model, const Precision& precision) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   for (const Sight& sight : model.sights())
     if (sight.active) spread += sight.p_MQ_mm * sight.p_MQ_mm.transpose();
-  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues();
+  const Eigen::Vector3d squares = symmetric_eigen(spread).values;
   const double count = std::max(1, model.active_count());
   const double along = std::sqrt(std::max(0.0, squares(2)) / count);
   const double across = std::sqrt(std::max(0.0, squares(0) + squares(1)) / count);

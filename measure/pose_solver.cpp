@@ -1,10 +1,10 @@
 #include "measure/pose_solver.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "calib/symmetric_eigen.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -121,11 +121,6 @@ Matrix6 unscaled(const Matrix6& M, const Vector6& scale) {
   return scale.asDiagonal() * M * scale.asDiagonal();
 }
 
-template <typename Matrix>
-double condition_of(const Matrix& M, const Matrix& inverse) {
-  return M.cwiseAbs().colwise().sum().maxCoeff() * inverse.cwiseAbs().colwise().sum().maxCoeff();
-}
-
 // The inverse of the scaled normal matrix (in the free directions) and its condition; false when singular.
 bool invert(const PoseModel& model, const Matrix6& N, Matrix6& inverse, double& condition) {
   condition = std::numeric_limits<double>::infinity();
@@ -147,10 +142,9 @@ bool invert(const PoseModel& model, const Matrix6& N, Matrix6& inverse, double& 
 }
 
 Vector6 weakest_direction(const PoseModel& model, const Matrix6& N) {
-  if (!model.planar()) return Eigen::SelfAdjointEigenSolver<Matrix6>(N).eigenvectors().col(0);
+  if (!model.planar()) return symmetric_eigen(N).vectors.col(0);
   const auto& basis = model.planar_basis();
-  const Eigen::Matrix3d N3 = basis.transpose() * N * basis;
-  return basis * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(N3).eigenvectors().col(0);
+  return basis * symmetric_eigen(basis.transpose() * N * basis).vectors.col(0);
 }
 
 // L with L L' = C for a covariance of two.

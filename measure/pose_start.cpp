@@ -1,13 +1,12 @@
 #include "measure/pose_start.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <optional>
+
+#include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
@@ -20,7 +19,7 @@ using Matrix39 = Eigen::Matrix<double, 3, 9>;
 using Matrix93 = Eigen::Matrix<double, 9, 3>;
 
 // Directions of sight within about 1e-4 rad are parallel.
-constexpr double parallel_rcond = 1e-8;
+constexpr double parallel_condition = 1e8;
 
 struct Ray {
   Vector3d p_WC_mm, direction_W;  // unit length
@@ -75,11 +74,13 @@ std::optional<DistanceForm> distance_form(const std::vector<Ray>& rays) {
     eyes += ray.across * ray.p_WC_mm;
     marks += ray.across * product_with(ray.p_MQ_mm);
   }
-  const Eigen::FullPivLU<Matrix3d> lu(sum);
-  if (rays.size() < 3 || lu.rcond() < parallel_rcond) return std::nullopt;
+  const SmallCholesky<3> cholesky(sum);
+  if (rays.size() < 3 || !cholesky.ok()) return std::nullopt;
+  const Matrix3d inverse = cholesky.inverse();
+  if (!(condition_of(sum, inverse) < parallel_condition)) return std::nullopt;
   DistanceForm form;
-  form.p0 = lu.solve(eyes);
-  form.S = lu.solve(marks);
+  form.p0 = inverse * eyes;
+  form.S = inverse * marks;
   for (const Ray& ray : rays) {
     const Matrix39 M = product_with(ray.p_MQ_mm) - form.S;
     const Vector3d rest = form.p0 - ray.p_WC_mm;
@@ -100,8 +101,9 @@ Matrix3d refine_rotation(const DistanceForm& form, Matrix3d R) {
     Matrix3d N = D.transpose() * form.Q * D;
     N.diagonal() *= 1 + damping;
     N.diagonal().array() += 1e-12 * N.trace();
-    const Vector3d phi = -N.ldlt().solve(slope);
-    if (!phi.allFinite()) return R;
+    const SmallCholesky<3> cholesky(N);
+    if (!cholesky.ok()) return R;
+    const Vector3d phi = -cholesky.solve(slope);
     const Matrix3d next = exp_so3(phi) * R;
     const double next_cost = form.cost(next);
     if (next_cost <= cost) {
@@ -186,7 +188,10 @@ std::vector<CentredPose> planar_start(const PoseModel& model) {
     N += J.transpose() * J;
     g += J.transpose() * rest;
   }
-  const Eigen::Vector4d solution = N.completeOrthogonalDecomposition().solve(g);
+  N.diagonal().array() += 1e-12 * N.trace();  // what the marks leave open stays near zero
+  const SmallCholesky<4> cholesky(N);
+  if (!cholesky.ok()) return {};
+  const Eigen::Vector4d solution = cholesky.solve(g);
   Pose X_PO = Pose::Identity();
   X_PO.linear() = exp_so3({0, 0, std::atan2(solution(1), solution(0))});
   X_PO.translation() << solution(2), solution(3), 0;

@@ -1,11 +1,11 @@
 #include "measure/security.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
+#include "calib/symmetric_eigen.h"
 #include "calib/words.h"
 
 namespace zeropose {
@@ -52,10 +52,7 @@ std::string missing_of(const Job& job, std::span<const CalibratedCamera> cameras
 double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
   Eigen::Matrix<double, 3, 6> J;
   J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.X_WO.linear() * p_O_mm);
-  const Eigen::Matrix3d covariance = J * pose.total_covariance * J.transpose();
-  return std::sqrt(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance, Eigen::EigenvaluesOnly)
-                       .eigenvalues()
-                       .maxCoeff());
+  return std::sqrt(symmetric_eigen(J * pose.total_covariance * J.transpose()).values.maxCoeff());
 }
 
 struct Place {

@@ -78,4 +78,10 @@ class SmallCholesky {
   bool ok_ = false;
 };
 
+// Of M by its inverse, in the 1-norm.
+template <typename Matrix>
+double condition_of(const Matrix& M, const Matrix& inverse) {
+  return M.cwiseAbs().colwise().sum().maxCoeff() * inverse.cwiseAbs().colwise().sum().maxCoeff();
+}
+
 }  // namespace zeropose
