@@ -88,7 +88,7 @@ TEST_F(FourCameras, LateFramesAreDropped) {
 
 TEST_F(FourCameras, OneKilledInMidGrabAndBack) {
   open();
-  const TimePoint deadline = in(400ms);
+  const TimePoint deadline = in(1s);
   std::vector<CameraWorker::Pending> pending;
   for (const auto& worker : workers_) pending.push_back(worker->request(deadline));
   simulated_.server().stop_camera(2);
@@ -203,14 +203,14 @@ class ScriptedWorker : public ::testing::Test {
   Script script_;
   CameraWorker worker_{CameraOptions{.name = "camera1", .address = "test"},
                        [this](const CameraOptions&) { return std::make_unique<ScriptedCamera>(script_); },
-                       CameraWorkerOptions{.check_period = 50ms, .overdue = 100ms}};
+                       CameraWorkerOptions{.check_period = 50ms, .overdue = 400ms}};
 };
 
 // The caller leaves at the deadline although the library blocks; the late frame answers nobody.
 TEST_F(ScriptedWorker, BlockingLibraryDoesNotHoldTheCaller) {
   script_.block_ms = 1500;
   const TimePoint begin = steady_clock::now();
-  EXPECT_EQ(worker_.request(in(50ms)).wait().status, GrabStatus::timeout);
+  EXPECT_EQ(worker_.request(in(300ms)).wait().status, GrabStatus::timeout);
   EXPECT_LT(steady_clock::now() - begin, 1000ms);
   script_.block_ms = 0;
   EXPECT_TRUE(becomes_state(worker_, CameraState::missing, 1s));  // while it blocks
@@ -221,10 +221,18 @@ TEST_F(ScriptedWorker, BlockingLibraryDoesNotHoldTheCaller) {
   EXPECT_EQ(result.frame.sequence, 2u);  // the first came late and was dropped
 }
 
+// On a busy machine a request's time may be over before the camera was asked: that is no time-out of the
+// camera.
 TEST_F(ScriptedWorker, TimeoutsInARowOpenItAnew) {
   script_.deliver = false;
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(worker_.request(in(20ms)).wait().status, GrabStatus::timeout);
-  EXPECT_TRUE(becomes([&] { return script_.opened == 2; }, 5s));
+  int requests = 0;
+  const auto opened_anew = [&] {
+    EXPECT_NE(worker_.request(in(20ms)).wait().status, GrabStatus::ok);
+    ++requests;
+    return script_.opened == 2;
+  };
+  EXPECT_TRUE(becomes(opened_anew, 10s));
+  EXPECT_GE(requests, 3);
   script_.deliver = true;
   EXPECT_TRUE(becomes_state(worker_, CameraState::alive, 5s));
   EXPECT_EQ(worker_.request(in(5s)).wait().status, GrabStatus::ok);
