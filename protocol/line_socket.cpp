@@ -85,7 +85,10 @@ LineServer::LineServer(std::filesystem::path socket, Answer answer)
   if (connect_to(probe.get(), address))
     throw std::runtime_error(socket_.string() +
                              ": another process already serves this socket; stop it or choose another path");
-  if (errno == ECONNREFUSED) ::unlink(socket_.c_str());
+  const bool refused = errno == ECONNREFUSED;
+  if (std::filesystem::exists(socket_) && !std::filesystem::is_socket(socket_))
+    throw std::runtime_error(socket_.string() + ": is there already and no socket; choose another path");
+  if (refused) ::unlink(socket_.c_str());
 
   listener_ = Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   stop_ = Descriptor(::eventfd(0, EFD_CLOEXEC));
