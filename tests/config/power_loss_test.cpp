@@ -4,12 +4,16 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/mount.h>
 #include <sys/ptrace.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
+#include <new>
+#include <random>
 #include <set>
 #include <system_error>
 
@@ -225,6 +229,53 @@ TEST(PowerLoss, KilledAtEverySystemCallTheFileIsOldOrNew) {
   EXPECT_TRUE(seen_old && seen_new);
   EXPECT_GT(stops, 20);
 }
+
+// What a saving process has reported as safely stored, seen by its parent.
+class SharedCount {
+ public:
+  SharedCount()
+      : count_(new (mmap(nullptr, sizeof(std::atomic<int>), PROT_READ | PROT_WRITE,
+                         MAP_SHARED | MAP_ANONYMOUS, -1, 0)) std::atomic<int>(0)) {}
+  ~SharedCount() { munmap(count_, sizeof(std::atomic<int>)); }
+  SharedCount(const SharedCount&) = delete;
+  SharedCount& operator=(const SharedCount&) = delete;
+  std::atomic<int>& operator*() { return *count_; }
+
+ private:
+  std::atomic<int>* count_;
+};
+
+// At any time while zeros are saved one after the other: what is there is the one that was reported last, or
+// the one after it.
+void expect_no_zero_is_lost(int kills) {
+  const TemporaryDirectory directory;
+  std::mt19937 generator(5);
+  SharedCount saved;
+  save_zero(directory.path(), record_of_frames(*saved = 1));
+  for (int kill_number = 0; kill_number < kills; ++kill_number) {
+    const int before = *saved;
+    const pid_t child = fork();
+    if (child == 0) {
+      for (int frames = before + 1;; ++frames) {
+        save_zero(directory.path(), record_of_frames(frames));
+        *saved = frames;
+      }
+    }
+    // Not before it saves, else a busy machine would only show processes that have not begun.
+    while (*saved == before && waitpid(child, nullptr, WNOHANG) == 0) usleep(100);
+    usleep(std::uniform_int_distribution<useconds_t>(0, 20'000)(generator));
+    kill(child, SIGKILL);
+    waitpid(child, nullptr, 0);
+    const int frames = frames_of(directory.path());
+    ASSERT_GT(*saved, before);
+    ASSERT_TRUE(frames == *saved || frames == *saved + 1)
+        << frames << " is there, " << *saved << " was reported";
+    *saved = frames;
+  }
+}
+
+TEST(PowerLoss, KilledAtAnyTimeTwentyTimes) { expect_no_zero_is_lost(20); }
+TEST(PowerLossLong, KilledAtAnyTimeAHundredTimes) { expect_no_zero_is_lost(100); }
 
 constexpr int cannot_mount = 77;
 
