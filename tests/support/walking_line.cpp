@@ -95,12 +95,8 @@ void WalkingLine::take_zero() {
 
 RobotAnswer WalkingLine::measure() {
   const std::uint32_t id = robot_.next_request_id();
-  const Pose X_WR = robot_in_world();
   recorder_.requested(id);
-  // The error of the rotation moves the robot's origin, which is 2.7 m away from the object's.
-  recorder_.truth(id, X_WR.inverse() * X_WO_ * X_WR,
-                  line_error_mm + X_WR.translation().norm() * line_error_deg / degrees_per_radian,
-                  2 * line_error_deg);
+  recorder_.truth(id, correction_of(X_WO_), correction_error_mm(), 2 * line_error_deg);
   return robot_.measure(1, id);
 }
 
@@ -139,9 +135,17 @@ Finished WalkingLine::zeropose(std::vector<std::string> arguments) const {
   return run_program(arguments);
 }
 
+Pose WalkingLine::correction_of(const Pose& X_WO) const {
+  const Pose X_WR = robot_in_world();
+  return X_WR.inverse() * X_WO * X_WR;
+}
+
+double WalkingLine::correction_error_mm() const {
+  return line_error_mm + robot_in_world().translation().norm() * line_error_deg / degrees_per_radian;
+}
+
 Pose WalkingLine::shift_from(const Pose& D_R) const {
-  const Pose X_WR =
-      from_six_numbers({1200, -2400, -150, 0, 0, 90});  // as in the cell file; X_WO0 is the identity
+  const Pose X_WR = robot_in_world();
   return X_WR * D_R * X_WR.inverse();
 }
 

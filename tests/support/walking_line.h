@@ -54,6 +54,10 @@ class WalkingLine {
   RobotAnswer acknowledge();
   // Watches from the first start of the daemon.
   Recorder& recorder() { return recorder_; }
+  // The robot-base shift that a robot must be sent for an object at X_WO, and how far it may be off: the
+  // error of the rotation moves the robot's origin, which is 2.7 m away from the object's.
+  Pose correction_of(const Pose& X_WO) const;
+  double correction_error_mm() const;
   // The robot-base shift that the robot was sent, as X_O0O.
   Pose shift_from(const Pose& D_R) const;
   const std::filesystem::path& cell_file() const { return cell_; }

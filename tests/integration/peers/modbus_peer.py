@@ -64,19 +64,27 @@ class Peer:
         raise AssertionError("no answer")
 
 
-def whole_handshake(peer, job, expected_values):
+def expect_correction(values, options):
+    if options.correction is None:
+        return
+    within = [options.within[0]] * 3 + [options.within[1]] * 3
+    assert all(abs(a - b) <= w for a, b, w in zip(values, options.correction, within)), (values, options.correction)
+
+
+def whole_handshake(peer, options):
     before = peer.block()
+    job = options.job
     request_id, refused = peer.send(MEASURE, job=job, part=0x01020304, argument=-5)
     assert refused == 0, refused
     block, seen = peer.wait(request_id)
-    assert any(s & BUSY and not s & EXPOSED for s in seen), seen
-    assert any(s & BUSY and s & EXPOSED for s in seen), seen
+    if options.server:  # a real measurement may be over between two looks
+        assert any(s & BUSY and not s & EXPOSED for s in seen), seen
+        assert any(s & BUSY and s & EXPOSED for s in seen), seen
     assert block.has(VALID | READY | EXPOSED) and block.code == 0, (block.status, block.code)
     assert block.epoch == before.epoch and block.part == 0x01020304 and block.job == job
     assert block.age < block.validity
     assert all(v != INVALID for v in block.values[:6]) and block.values[6:] == [INVALID] * 2
-    if expected_values is not None:
-        assert all(abs(a - b) <= 1 for a, b in zip(block.values, expected_values)), block.values
+    expect_correction(block.values, options)
     mirror = peer.block(function=3)
     assert mirror.values == block.values and mirror.request_id == request_id
     assert peer.send(ACKNOWLEDGE, request_id)[1] == 0
@@ -85,13 +93,24 @@ def whole_handshake(peer, job, expected_values):
     return block
 
 
+def second_while_busy(peer, job, attempts=20):
+    """The last request id; on a busy machine the first command may be done before the second comes."""
+    for _ in range(attempts):
+        last, refused = peer.send(MEASURE, job=job)
+        assert refused == 0, refused
+        second, refused = peer.send(MEASURE, job=job)
+        last = last if refused else second
+        peer.wait(last)
+        assert peer.send(ACKNOWLEDGE, last)[1] == 0
+        if refused:
+            assert refused == 6, "a second command while busy"
+            return last
+    raise AssertionError("never busy")
+
+
 def refusals(peer, job):
     """None of these may change a register."""
-    last, refused = peer.send(MEASURE, job=job)
-    assert refused == 0
-    assert peer.send(MEASURE, job=job)[1] == 6, "a second command while busy"
-    peer.wait(last)
-    assert peer.send(ACKNOWLEDGE, last)[1] == 0
+    last = second_while_busy(peer, job)
     before = peer.block()
     wrong_crc = command(peer.next_id, MEASURE, job)
     wrong_crc[8] ^= 0x10
@@ -116,9 +135,10 @@ def refusals(peer, job):
     assert vars(after) == vars(before), "a refusal has changed the block"
 
 
-def other_answers(peer):
+def other_answers(peer, options):
     """Against the test server: every field and every kind of answer."""
-    block = whole_handshake(peer, 1, [12345, -6789, 1, 302500, -5678, 1234])  # KUKA: A = rz
+    options.job, options.correction = 1, [12345, -6789, 1, 302500, -5678, 1234]  # KUKA: A = rz
+    block = whole_handshake(peer, options)
     assert (block.robot, block.convention, block.frame) == (2, 2, 3)
     assert (block.marks, block.cameras, block.deviation, block.sigma) == (11, 4, 250, 31)
     assert (block.config_hash, block.calibration_hash, block.zero_id) == (0x01020304, 0x05060708, 0x09090909)
@@ -181,16 +201,17 @@ def lost_owner(options, port):
 def main():
     parser = arguments(__doc__)
     parser.add_argument("--job", type=int, default=1)
-    parser.add_argument("--correction", type=int, nargs=6, help="the six values on the wire, +-1")
+    parser.add_argument("--correction", type=int, nargs=6, help="the six values on the wire")
+    parser.add_argument("--within", type=int, nargs=2, default=[1, 1], help="of the lengths, of the angles")
     options = parser.parse_args()
     with running(options) as port:
         peer = Peer(options.host, port, options.unit)
-        block = whole_handshake(peer, options.job, options.correction)
+        block = whole_handshake(peer, options)
         refusals(peer, options.job)
         if options.server:
-            other_answers(peer)
+            other_answers(peer, options)
             lost_owner(options, port)
-        whole_handshake(peer, options.job, options.correction)
+        whole_handshake(peer, options)
         print(f"pymodbus: {peer.checks} blocks and answers checked, correction {block.values[:6]}")
         peer.client.close()
 
