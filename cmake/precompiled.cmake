@@ -17,7 +17,8 @@ endfunction()
 
 # Inside a precompiled std::string g++ 12 shows warnings that it holds back elsewhere, about overruns that are none.
 function(zeropose_precompile target group)
-  target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>)
+  target_compile_options(${target} PRIVATE
+    "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overread;-Wno-stringop-overflow>")
   target_precompile_headers(${target} REUSE_FROM zeropose_precompiled_${group})
 endfunction()
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "calib/words.h"
 #include "measure/board_circles.h"
 #include "measure/board_place.h"
 #include "measure/chessboard.h"

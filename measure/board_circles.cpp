@@ -8,6 +8,7 @@
 #include <string>
 #include <tuple>
 
+#include "calib/words.h"
 #include "measure/board_grid.h"
 #include "measure/board_place.h"
 #include "measure/mark_candidates.h"

@@ -6,6 +6,7 @@
 #include <optional>
 #include <tuple>
 
+#include "calib/words.h"
 #include "measure/chessboard_corners.h"
 #include "measure/saddle_fit.h"
 

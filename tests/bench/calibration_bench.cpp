@@ -1,4 +1,5 @@
-// Refinement of one view, all 11 parameters, against Ceres with automatic derivatives: same points, same start.
+// Refinement of one view, all 11 parameters, against Ceres with automatic derivatives: same points, same
+// start.
 #include <benchmark/benchmark.h>
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
@@ -19,7 +20,8 @@ struct View {
   Pose X_WC;
 };
 
-// Points at random in a body of 300 x 220 x 150 mm; the start is that of the linear method at the image centre.
+// Points at random in a body of 300 x 220 x 150 mm; the start is that of the linear method at the image
+// centre.
 View view_of(std::int64_t count) {
   const CameraModel camera = test::division_camera(-0.2);
   std::mt19937_64 random(7);
@@ -84,9 +86,9 @@ void ceres_autodiff(benchmark::State& state) {
     double pose[6] = {turn.x(), turn.y(), turn.z(), t.x(), t.y(), t.z()};
     ceres::Problem problem;
     for (const CalibrationPoint& point : view.points)
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Residuals, 2, 5, 6>(
-                                   new Residuals{point.p_W_mm, point.u_px}),
-                               nullptr, internals, pose);
+      problem.AddResidualBlock(
+          new ceres::AutoDiffCostFunction<Residuals, 2, 5, 6>(new Residuals{point.p_W_mm, point.u_px}),
+          nullptr, internals, pose);
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.num_threads = 1;
