@@ -17,10 +17,12 @@ endfunction()
 
 # Inside a precompiled std::string g++ 12 shows warnings that it holds back elsewhere, about overruns that are none.
 function(zeropose_precompile target group)
-  target_compile_options(${target} PRIVATE
-    "$<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds;-Wno-stringop-overread;-Wno-stringop-overflow>")
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(${target} PRIVATE -Wno-array-bounds -Wno-stringop-overflow -Wno-stringop-overread)
+  endif()
   target_precompile_headers(${target} REUSE_FROM zeropose_precompiled_${group})
 endfunction()
 
-zeropose_precompiled(eigen LINK Eigen3::Eigen HEADERS <Eigen/Geometry>)
+zeropose_precompiled(pure LINK Eigen3::Eigen HEADERS <Eigen/Geometry>)
+set_property(TARGET zeropose_precompiled_pure PROPERTY ZEROPOSE_PURE ON)
 zeropose_precompiled(json LINK Eigen3::Eigen nlohmann_json::nlohmann_json HEADERS <Eigen/Geometry> <nlohmann/json.hpp>)
