@@ -83,7 +83,7 @@ class Freedom {
   }
 
   // The equations in the free parameters.
-  NormalEquations chosen(NormalEquations all, const Matrix6& pose) const {
+  ViewEquations chosen(ViewEquations all, const Matrix6& pose) const {
     all.N.rightCols<6>() *= pose;
     all.N.bottomRows<6>() = pose.transpose() * all.N.bottomRows<6>();
     all.g.tail<6>() = pose.transpose() * all.g.tail<6>();
@@ -92,7 +92,7 @@ class Freedom {
       all.N.row(0) += all.N.row(1) / aspect_;
       all.g(0) += all.g(1) / aspect_;
     }
-    NormalEquations chosen = all;
+    ViewEquations chosen = all;
     const auto n = static_cast<Eigen::Index>(list_.size());
     chosen.N.resize(n, n);
     chosen.g.resize(n);
@@ -182,7 +182,7 @@ struct Scaled {
   SmallVector scale;  // step = scale * scaled step
 };
 
-Scaled scaled(const NormalEquations& equations) {
+Scaled scaled(const ViewEquations& equations) {
   Scaled result;
   result.scale =
       equations.N.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
@@ -193,7 +193,7 @@ Scaled scaled(const NormalEquations& equations) {
 
 struct Descent {
   State state;
-  NormalEquations equations;
+  ViewEquations equations;
   int iterations = 0;
   bool converged = false;
 };
@@ -226,7 +226,7 @@ Descent descend(const RefineProblem& problem, const PointColumns& columns, const
     const double promised = step.dot(own.g);
     at.converged = promised <= last_step * at.equations.cost + rounding;
     State next = freedom.moved_by(at.state, own.scale.cwiseProduct(step));
-    NormalEquations there = normal_equations(columns, next.model, next.X_WC, objective);
+    ViewEquations there = normal_equations(columns, next.model, next.X_WC, objective);
     const bool better = there.visible && there.cost <= at.equations.cost;
     if (better) {
       at.state = std::move(next);
@@ -251,7 +251,7 @@ Descent descend_robustly(const RefineProblem& problem, const PointColumns& colum
   double robust = problem.robust;
   if (robust > 0) {
     const auto points = static_cast<double>(problem.points.size());
-    const NormalEquations first =
+    const ViewEquations first =
         normal_equations(columns, start.model, start.X_WC, Objective{problem.residual, 0});
     if (first.visible) robust = std::max(robust, 2 * std::sqrt(first.cost / points));
   }

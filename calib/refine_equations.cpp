@@ -114,7 +114,7 @@ struct Residuals {
 
 // Adds J' W J and J' W r into their places of the whole, the lower triangle by places.
 template <int n>
-void add_own(const Residuals<n>& a, const Column& w, NormalEquations& sum) {
+void add_own(const Residuals<n>& a, const Column& w, ViewEquations& sum) {
   for (int i = 0; i < n; ++i) {
     const int row = a.places[static_cast<std::size_t>(i)];
     const Column weighted = a.J.col(i) * w;
@@ -126,7 +126,7 @@ void add_own(const Residuals<n>& a, const Column& w, NormalEquations& sum) {
 
 // The same for the covariance between the two residuals.
 template <int n>
-void add_mixed(const Residuals<n>& a, const Residuals<n>& b, const Column& w, NormalEquations& sum) {
+void add_mixed(const Residuals<n>& a, const Residuals<n>& b, const Column& w, ViewEquations& sum) {
   for (int i = 0; i < n; ++i) {
     const int row = a.places[static_cast<std::size_t>(i)];
     const Column weighted = a.J.col(i) * w;
@@ -144,7 +144,7 @@ void add_mixed(const Residuals<n>& a, const Residuals<n>& b, const Column& w, No
 
 template <int n>
 void add_both(const Residuals<n>& u, const Residuals<n>& v, const PointColumns& points, Eigen::Index first,
-              double robust, NormalEquations& sum) {
+              double robust, ViewEquations& sum) {
   Column wuu = points.wuu.segment<block>(first), wvv = points.wvv.segment<block>(first);
   Column wuv = points.wuv.segment<block>(first);
   const Column square = wuu * u.r.square() + wvv * v.r.square() + 2 * wuv * u.r * v.r;
@@ -165,7 +165,7 @@ void add_both(const Residuals<n>& u, const Residuals<n>& v, const PointColumns& 
 
 template <class Lens>
 bool add_reprojection(const PointColumns& points, Eigen::Index first, const CameraModel& camera,
-                      const Lens& lens, const Pose& X_WC, double robust, NormalEquations& sum) {
+                      const Lens& lens, const Pose& X_WC, double robust, ViewEquations& sum) {
   constexpr int n = Lens::size + 8;
   const Seen seen(points, first, X_WC);
   if (!(seen.cz.minCoeff() > 0)) return false;
@@ -198,7 +198,7 @@ bool add_reprojection(const PointColumns& points, Eigen::Index first, const Came
 // zc (u - Cx) - xc fx (1 + K r2), r2 of the observed point, and the same with v: spec 30 C6. The residuals
 // here are found minus predicted as above, so the derivatives have the opposite sign.
 bool add_algebraic(const PointColumns& points, Eigen::Index first, const CameraModel& camera, double K,
-                   const Pose& X_WC, double robust, NormalEquations& sum) {
+                   const Pose& X_WC, double robust, ViewEquations& sum) {
   constexpr int n = 11;
   const Seen seen(points, first, X_WC);
   if (!(seen.cz.minCoeff() > 0)) return false;
@@ -228,7 +228,7 @@ bool add_algebraic(const PointColumns& points, Eigen::Index first, const CameraM
 }
 
 bool add_block(const PointColumns& points, Eigen::Index first, const CameraModel& camera, const Pose& X_WC,
-               const Objective& objective, NormalEquations& sum) {
+               const Objective& objective, ViewEquations& sum) {
   if (const auto* division = std::get_if<Division>(&camera.distortion)) {
     if (objective.residual == Residual::algebraic)
       return add_algebraic(points, first, camera, division->K, X_WC, objective.robust, sum);
@@ -268,10 +268,10 @@ Eigen::Index lens_size(const CameraModel& camera) {
   return std::holds_alternative<Division>(camera.distortion) ? 1 : 5;
 }
 
-NormalEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
-                                 const Objective& objective) {
+ViewEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
+                               const Objective& objective) {
   const Eigen::Index size = 10 + lens_size(camera);
-  NormalEquations sum;
+  ViewEquations sum;
   sum.N.setZero(size, size);
   sum.g.setZero(size);
   const Eigen::Index n = points.x_mm.size();

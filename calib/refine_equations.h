@@ -25,7 +25,7 @@ using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 15, 1>;
 
 // For all parameters of the model in the order fx fy cx cy, the lens' (K or k1 k2 p1 p2 k3), then the
 // pose's delta of moved(X_WC): translation mm, rotation rad.
-struct NormalEquations {
+struct ViewEquations {
   bool visible = false;  // every point has an image, all numbers are finite
   double cost = 0;       // sum of squared residuals
   SmallMatrix N;         // J' J, both triangles
@@ -37,8 +37,8 @@ struct Objective {
   Residual residual = Residual::reprojection;
   double robust = 0;
 };
-NormalEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
-                                 const Objective& objective);
+ViewEquations normal_equations(const PointColumns& points, const CameraModel& camera, const Pose& X_WC,
+                               const Objective& objective);
 
 // Number of the lens' parameters: 1 or 5.
 Eigen::Index lens_size(const CameraModel& camera);

@@ -199,8 +199,8 @@ Coverage coverage_of(const CalibrationProblem& problem, const CalibrationResult&
   return coverage;
 }
 
-Verdict judge(const CalibrationProblem& problem, const CalibrationResult& result) {
-  Verdict verdict;
+CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationResult& result) {
+  CalibrationVerdict verdict;
   if (result.status != CalibrationStatus::ok) {
     verdict.summary = "Not usable: there is no result.";
     verdict.findings.push_back({Quality::not_usable, result.reason});

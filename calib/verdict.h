@@ -30,7 +30,7 @@ struct Finding {
   std::string text;
 };
 
-struct Verdict {
+struct CalibrationVerdict {
   Quality quality = Quality::not_usable;  // the worst of the findings
   std::string summary;                    // one sentence
   std::vector<Finding> findings;          // worst first
@@ -38,6 +38,6 @@ struct Verdict {
 
 // Compares residuals, coverage, sigma of the origin, redundancy, correlations and rejected points with the
 // limits of docs/calibration.md. A good fit alone is not enough: a wrong camera can have small residuals.
-Verdict judge(const CalibrationProblem& problem, const CalibrationResult& result);
+CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationResult& result);
 
 }  // namespace zeropose

@@ -31,7 +31,7 @@ ViewsResult failure(const Verdict& verdict) {
 Freedom freedom_of(const ViewsProblem& problem) {
   Freedom freedom;
   bool any_known = false;
-  for (const View& view : problem.views) {
+  for (const BoardView& view : problem.views) {
     freedom.views.push_back(!view.X_WB.has_value());
     any_known = any_known || view.X_WB.has_value();
   }
@@ -82,7 +82,7 @@ struct Calibration {
   }
 
   void refine_once() {
-    Options options{problem.loss_px, problem.max_iterations, {}};
+    Options options{problem.robust, problem.max_iterations, {}};
     if (problem.progress)
       options.progress = [this](int iteration, double cost) {
         problem.progress(iterations + iteration, cost);
@@ -101,7 +101,7 @@ struct Calibration {
   void settle_the_right_way_round() {
     for (int round = 0; round < mirror_rounds; ++round) {
       settle();
-      if (!last.usable || !turn_mirrored_views(problem, state, chunks, problem.loss_px)) return;
+      if (!last.usable || !turn_mirrored_views(problem, state, chunks, problem.robust)) return;
     }
     settle();
   }

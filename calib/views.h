@@ -31,7 +31,7 @@ struct ViewsCamera {
   bool one_focal = false;  // fx = fy
 };
 
-struct View {
+struct BoardView {
   std::string name;
   std::optional<Pose> X_WB;  // known and held
 };
@@ -39,11 +39,11 @@ struct View {
 // Frame W: that of the known poses X_WB; where none is known, the first camera (X_WC = identity).
 struct ViewsProblem {
   std::span<const ViewsCamera> cameras;
-  std::span<const View> views;
+  std::span<const BoardView> views;
   std::span<const ViewPoint> points;
   double sigma_px = 0;   // of one pixel coordinate, scales the covariances; 0: from the residuals
   double reject_px = 0;  // points with a larger deviation are thrown out, worst first; 0: never
-  double loss_px = 0;    // Cauchy's loss, this many sigmas wide (with identity covariances: px); 0: none
+  double robust = 0;     // Cauchy's loss, this many sigmas wide (with identity covariances: px); 0: none
   int max_iterations = 100;
   std::function<void(int iteration, double cost)> progress;  // cost: half the sum of squares
 };

@@ -214,7 +214,7 @@ void set_freedom(ceres::Problem& problem, Blocks& blocks, const Freedom& freedom
   for (std::size_t v = 0; v < blocks.views.size(); ++v) pose(blocks.views[v].data(), freedom.views[v]);
 }
 
-// View poses are eliminated first. Without a free view, or with nothing else free, there is nothing to
+// BoardView poses are eliminated first. Without a free view, or with nothing else free, there is nothing to
 // eliminate.
 void set_solver(ceres::Solver::Options& options, const ceres::Problem& problem, Blocks& blocks) {
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();

@@ -71,7 +71,7 @@ Verdict check_point(const ViewsProblem& problem, std::size_t index) {
   return {};
 }
 
-Verdict check_view(const View& view) {
+Verdict check_view(const BoardView& view) {
   if (!view.X_WB) return {};
   if (!view.X_WB->matrix().allFinite())
     return refused(Status::not_finite, "its known pose holds a number that is none");
@@ -210,14 +210,14 @@ BestPlane best_plane(std::span<const Vector3d> points) {
 Verdict check_problem(const ViewsProblem& problem) {
   if (problem.cameras.empty()) return refused(Status::wrong_problem, "there is no camera");
   if (problem.views.empty()) return refused(Status::too_few_points, "there are no views");
-  const bool options = problem.sigma_px >= 0 && problem.reject_px >= 0 && problem.loss_px >= 0 &&
-                       std::isfinite(problem.sigma_px + problem.reject_px + problem.loss_px);
+  const bool options = problem.sigma_px >= 0 && problem.reject_px >= 0 && problem.robust >= 0 &&
+                       std::isfinite(problem.sigma_px + problem.reject_px + problem.robust);
   if (!options)
-    return refused(Status::wrong_problem, "sigma_px, reject_px and loss_px must be finite and not below 0");
+    return refused(Status::wrong_problem, "sigma_px, reject_px and robust must be finite and not below 0");
   for (const ViewsCamera& camera : problem.cameras)
     if (const Verdict verdict = check_camera(camera); verdict.status != Status::ok)
       return with_name(verdict, "camera " + quoted(camera.name));
-  for (const View& view : problem.views)
+  for (const BoardView& view : problem.views)
     if (const Verdict verdict = check_view(view); verdict.status != Status::ok)
       return with_name(verdict, "view " + quoted(view.name));
   for (std::size_t i = 0; i < problem.points.size(); ++i)

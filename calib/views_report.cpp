@@ -245,7 +245,7 @@ std::optional<CalibrationDeviation> deviation_of(const State& state, const ViewP
 ViewsResult report_of(const ViewsProblem& problem, const State& state, std::span<const Chunk> chunks,
                       const Freedom& freedom) {
   ViewsResult result;
-  const UncertaintyAnswer answer = uncertainty_of(problem, state, chunks, freedom, problem.loss_px);
+  const UncertaintyAnswer answer = uncertainty_of(problem, state, chunks, freedom, problem.robust);
   result.residual_sum = cost_of(state, chunks, 0);
   double equations = 0;
   for (const Chunk& chunk : chunks) equations += 2 * static_cast<double>(chunk.points.size());

@@ -165,7 +165,7 @@ bool start_camera(const ViewsProblem& problem, State& state, std::size_t camera,
     const bool enough = has_start || square_px(trial, chunks) < close_by * close_by * diagonal * diagonal;
     if (!enough || problem.cameras.size() > 1)
       refine(trial, chunks, freedom_of_one(freedom, camera, groups.back().known),
-             {problem.loss_px, trial_iterations, {}});
+             {problem.robust, trial_iterations, {}});
     const double square = square_px(trial, chunks);
     if (square < least) best = trial, least = square;
     if (enough) break;
@@ -246,7 +246,7 @@ State empty_state(const ViewsProblem& problem) {
     state.models.push_back(model);
   }
   state.X_WC.assign(problem.cameras.size(), Pose::Identity());
-  for (const View& view : problem.views) state.X_WB.push_back(view.X_WB.value_or(Pose::Identity()));
+  for (const BoardView& view : problem.views) state.X_WB.push_back(view.X_WB.value_or(Pose::Identity()));
   return state;
 }
 
@@ -254,7 +254,7 @@ Start start_of(const ViewsProblem& problem, std::span<const Chunk> chunks, const
   Start start;
   start.state = empty_state(problem);
   std::vector<bool> cameras(problem.cameras.size()), views;
-  for (const View& view : problem.views) views.push_back(view.X_WB.has_value());
+  for (const BoardView& view : problem.views) views.push_back(view.X_WB.has_value());
   std::vector<Seen> seen;
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     State alone = start.state;

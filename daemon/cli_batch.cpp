@@ -79,6 +79,13 @@ void add_check_config(CLI::App& app, int& exit_status) {
   });
 }
 
+// 6x6, mm and rad.
+Json covariance_json(const Matrix6& covariance) {
+  Json rows = Json::array();
+  for (int row = 0; row < 6; ++row) rows.push_back(json_of(Vector6(covariance.row(row))));
+  return rows;
+}
+
 // --- bestfit
 
 std::string reason_of(BestFitStatus status) {
@@ -110,8 +117,13 @@ Answer best_fit_of(const std::string& file) {
                  {"reason", ""},
                  {"X_AB", six},
                  {"residuals", residuals_json},
-                 {"rms_mm", result.rms_mm}};
-  answer.text = "X_AB, mm and degrees:\n" + table_of(six) + "\nresiduals p_A - X_AB p_B, mm:\n" + residuals +
+                 {"rms_mm", result.rms_mm},
+                 {"sigma_mm", result.sigma_mm},
+                 {"covariance", covariance_json(result.covariance)}};
+  Vector6 sigma = result.covariance.diagonal().cwiseSqrt();
+  sigma.tail<3>() *= degrees_per_radian;
+  answer.text = "X_AB, mm and degrees:\n" + table_of(six) + "\nsigma along and about A's axes:\n" +
+                table_of({sigma.data(), 6}) + "\nresiduals p_A - X_AB p_B, mm:\n" + residuals +
                 "rms, mm:" + table_of({&result.rms_mm, 1}) + "\n";
   return answer;
 }
@@ -127,7 +139,8 @@ void add_bestfit(CLI::App& app, int& exit_status) {
   verb->add_option("--points", options->points, "CSV with the columns xa ya za xb yb zb [weight], mm")
       ->required();
   verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, X_AB [x, y, z, rx, ry, rz], residuals, rms_mm");
+                 "one JSON object on stdout: status, reason, X_AB [x, y, z, rx, ry, rz], residuals, rms_mm,\n"
+                 "sigma_mm, covariance (6x6, mm and rad)");
   verb->footer(bestfit_help);
   verb->callback([options, &exit_status] {
     exit_status = run([&] { return best_fit_of(options->points); }, options->json);
@@ -169,10 +182,7 @@ Json pose_json(const PoseInput& input, const PoseResult& result) {
                {"name", text_of(result.code).name}};
   // No number that could be taken for a pose unless it is one.
   json["X_WO"] = good ? Json(six_of(result.X_WO)) : Json();
-  json["covariance"] = Json();
-  if (good)
-    for (int row = 0; row < 6; ++row)
-      json["covariance"].push_back(json_of(Vector6(result.covariance.row(row))));
+  json["covariance"] = good ? covariance_json(result.covariance) : Json();
   json["deviations"] = Json::array();
   for (std::size_t i = 0; i < result.deviations.size(); ++i)
     json["deviations"].push_back(deviation_json(input, i, result.deviations[i]));

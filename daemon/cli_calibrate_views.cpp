@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iostream>
 #include <memory>
 #include <optional>
 
@@ -43,7 +44,7 @@ struct ViewsOptions {
   std::string model = "division";
   std::optional<std::string> start, fix;
   bool one_focal = false;
-  double sigma_px = 0, reject_px = 0, loss_px = 0;
+  double sigma_px = 0, reject_px = 0, robust = 0;
   bool json = false;
 };
 
@@ -223,18 +224,25 @@ std::string text_of_result(const CalibrationViews& input, const ViewsResult& res
   return text.str();
 }
 
+// So many take long enough that somebody wants to see it go on.
+constexpr std::size_t many_points = 20000;
+
 Answer calibrate_views_of(const ViewsOptions& options) {
   const CalibrationViews input = load_calibration_views(options.points);
   if (input.points.empty())
     return {
         no_answer, {{"status", "too_few_points"}, {"reason", "the table holds no points"}}, "no points\n"};
   const std::vector<ViewsCamera> cameras = cameras_of(options, input.cameras);
-  std::vector<View> views;
+  std::vector<BoardView> views;
   for (const std::string& name : input.views) views.push_back({name, std::nullopt});
   ViewsProblem problem;
   problem.cameras = cameras, problem.views = views, problem.points = input.points;
-  problem.sigma_px = options.sigma_px, problem.reject_px = options.reject_px,
-  problem.loss_px = options.loss_px;
+  problem.sigma_px = options.sigma_px, problem.reject_px = options.reject_px, problem.robust = options.robust;
+  if (input.points.size() > many_points)
+    problem.progress = [&input](int iteration, double cost) {
+      std::cerr << "step " << iteration << ": rms "
+                << std::sqrt(2 * cost / static_cast<double>(input.points.size())) << " px\n";
+    };
   const ViewsResult result = calibrate_views(problem);
   return {result.status == CalibrationStatus::ok ? done : no_answer, json_of_result(input, result),
           text_of_result(input, result)};
@@ -255,7 +263,8 @@ void add_options(CLI::App& verb, ViewsOptions& options) {
       ->check(CLI::Range(0.0, 100.0));
   verb.add_option("--reject-px", options.reject_px, "throw out points that deviate by more, worst first")
       ->check(CLI::Range(0.0, 1e6));
-  verb.add_option("--loss-px", options.loss_px, "Cauchy's robust loss of this width")
+  verb.add_option("--robust", options.robust,
+                  "Cauchy's loss: deviations of many times this, px, count little")
       ->check(CLI::Range(0.0, 1e6));
   verb.add_flag("--json", options.json,
                 "one JSON object on stdout: status, reason, camera or cameras, sigma, correlation, views,\n"

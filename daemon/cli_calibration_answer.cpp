@@ -53,7 +53,7 @@ Json deviations_json(const CalibrationReport& report) {
   return deviations;
 }
 
-Json verdict_json(const Verdict& verdict) {
+Json verdict_json(const CalibrationVerdict& verdict) {
   Json findings = Json::array();
   for (const Finding& finding : verdict.findings)
     findings.push_back({{"quality", name_of(finding.quality)}, {"text", finding.text}});
@@ -177,7 +177,7 @@ Json cli::calibration_json(const CalibrationReport& report) {
 std::string cli::calibration_text(const CalibrationReport& report, bool rad) {
   const CalibrationResult& result = report.result;
   std::ostringstream text;
-  const Verdict verdict = judge(report.problem, result);
+  const CalibrationVerdict verdict = judge(report.problem, result);
   text << verdict.summary << "\n";
   for (const Finding& finding : verdict.findings)
     text << "  " << std::left << std::setw(11) << name_of(finding.quality) << std::right << finding.text

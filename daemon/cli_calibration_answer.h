@@ -10,8 +10,8 @@ namespace zeropose::cli {
 
 // The keys of spec 92 and more: X_CW, verdict, coverage, comparison. The result's status must be ok.
 Json calibration_json(const CalibrationReport& report);
-// Verdict, warnings, parameters with sigmas, steps and the worst points. rad: angles in rad instead of
-// degrees.
+// CalibrationVerdict, warnings, parameters with sigmas, steps and the worst points. rad: angles in rad
+// instead of degrees.
 std::string calibration_text(const CalibrationReport& report, bool rad);
 // Where there is no result.
 Answer calibration_failure(const CalibrationResult& result);

@@ -145,21 +145,21 @@ bool Handshake::is_abandoned(std::uint32_t request_id, TimePoint now) {
   return std::ranges::find(abandoned_, request_id, &Abandoned::id) != abandoned_.end();
 }
 
-Verdict Handshake::refuse(Verdict verdict) {
+CommandVerdict Handshake::refuse(CommandVerdict verdict) {
   switch (verdict) {
-    case Verdict::busy:
+    case CommandVerdict::busy:
       ++counters_.refused_busy;
       break;
-    case Verdict::wrong_request_id:
+    case CommandVerdict::wrong_request_id:
       ++counters_.refused_request_id;
       break;
-    case Verdict::wrong_acknowledge:
+    case CommandVerdict::wrong_acknowledge:
       ++counters_.refused_acknowledge;
       break;
-    case Verdict::wrong_argument:
+    case CommandVerdict::wrong_argument:
       ++counters_.refused_argument;
       break;
-    case Verdict::accepted:
+    case CommandVerdict::accepted:
       break;
   }
   return verdict;
@@ -167,14 +167,14 @@ Verdict Handshake::refuse(Verdict verdict) {
 
 CommandOutcome Handshake::on_command(const Command& command, ConnectionId from, TimePoint now) {
   tick(now);
-  if (execution_) return {refuse(Verdict::busy), {}};
+  if (execution_) return {refuse(CommandVerdict::busy), {}};
   if (command.kind == static_cast<std::uint16_t>(CommandKind::acknowledge)) return acknowledge(command, from);
   if (command.request_id == 0 || command.request_id == last_id_ || is_abandoned(command.request_id, now))
-    return {refuse(Verdict::wrong_request_id), {}};
+    return {refuse(CommandVerdict::wrong_request_id), {}};
   if (command.kind == static_cast<std::uint16_t>(CommandKind::heartbeat)) {
-    if (command.argument != 0) return {refuse(Verdict::wrong_argument), {}};
+    if (command.argument != 0) return {refuse(CommandVerdict::wrong_argument), {}};
     ++counters_.heartbeats;
-    return {Verdict::accepted, {}};
+    return {CommandVerdict::accepted, {}};
   }
   answer_.reset();
   last_id_ = command.request_id;
@@ -188,11 +188,11 @@ CommandOutcome Handshake::on_command(const Command& command, ConnectionId from, 
 // Also after the answer has been withdrawn for another reason, and again: then there is nothing left to do.
 CommandOutcome Handshake::acknowledge(const Command& command, ConnectionId from) {
   if (command.request_id == 0 || command.request_id != last_id_ || owner_ != from)
-    return {refuse(Verdict::wrong_acknowledge), {}};
-  if (command.argument != 0) return {refuse(Verdict::wrong_argument), {}};
+    return {refuse(CommandVerdict::wrong_acknowledge), {}};
+  if (command.argument != 0) return {refuse(CommandVerdict::wrong_argument), {}};
   ++counters_.accepted;
   answer_.reset();
-  CommandOutcome outcome{Verdict::accepted, {}};
+  CommandOutcome outcome{CommandVerdict::accepted, {}};
   if (error_) {
     error_ = false;
     outcome.request =
@@ -250,7 +250,7 @@ Request Handshake::request_of(const Command& command, TimePoint now) {
 
 CommandOutcome Handshake::start(const Command& command, TimePoint now) {
   execution_ = Execution{request_of(command, now), cell_};
-  return {Verdict::accepted, execution_->request};
+  return {CommandVerdict::accepted, execution_->request};
 }
 
 // Code ok: done, without a correction.
@@ -262,7 +262,7 @@ CommandOutcome Handshake::answer_at_once(const Command& command, Code code, Time
     put_report(report, options_.convention, answer_->fields);
     ++counters_.not_ok_results;
   }
-  return {Verdict::accepted, {}};
+  return {CommandVerdict::accepted, {}};
 }
 
 void Handshake::on_exposure_done(std::uint32_t request_id, TimePoint now) {

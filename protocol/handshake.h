@@ -26,7 +26,7 @@ struct HandshakeOptions {
 
 using ConnectionId = std::uint64_t;
 
-enum class Verdict {
+enum class CommandVerdict {
   busy,               // exception 06
   wrong_request_id,   // 0, the last one again, or one whose late answer is still to come: exception 03
   wrong_acknowledge,  // not the last id, or not the connection that sent it: exception 03
@@ -35,7 +35,7 @@ enum class Verdict {
 };
 
 struct CommandOutcome {
-  Verdict verdict = Verdict::wrong_request_id;
+  CommandVerdict verdict = CommandVerdict::wrong_request_id;
   // What the cycle has to do. Measure, Zero and SelectJob want a report; Reset only says: validate again.
   std::optional<Request> request;
 };
@@ -97,7 +97,7 @@ class Handshake {
   CommandOutcome start(const Command& command, TimePoint now);
   CommandOutcome answer_at_once(const Command& command, Code code, TimePoint now);
   Request request_of(const Command& command, TimePoint now);
-  Verdict refuse(Verdict verdict);
+  CommandVerdict refuse(CommandVerdict verdict);
   bool is_ready() const;
   Code code_of(const Execution& execution, const Report& report) const;
   void publish(const Execution& execution, const Report& report, TimePoint now);

@@ -85,8 +85,8 @@ std::vector<std::uint8_t> ModbusTcpLink::Server::take_command(const Adu& request
   }
   CommandOutcome outcome;
   locked([&](Handshake& handshake, TimePoint now) { outcome = handshake.on_command(*command, id, now); });
-  if (outcome.verdict == Verdict::busy) return exception(request, modbus::busy);
-  if (outcome.verdict != Verdict::accepted) return exception(request, modbus::illegal_data_value);
+  if (outcome.verdict == CommandVerdict::busy) return exception(request, modbus::busy);
+  if (outcome.verdict != CommandVerdict::accepted) return exception(request, modbus::illegal_data_value);
   if (outcome.request) hand_over(*outcome.request);
   return reply_.written(request);
 }

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Each room includes only what the architecture allows (docs/architecture.md): exit 1 and the lines that break it."""
+"""Each room includes only what the architecture allows (docs/architecture.md), and no two headers give the same name
+to different types of the project's namespace, which the linker would mix up: exit 1 and the lines that break it."""
 import pathlib
 import re
 import sys
@@ -26,10 +27,27 @@ DOORS = {
 IMPURE = re.compile(r"#include <(nlohmann|spdlog|fstream|iostream|thread|sys/|arv|modbus)")
 PURE = {"calib", "measure"}
 
+TYPE = re.compile(r"(?:struct|class|enum class|enum) (\w+)(?: final)? ?(?:: .*)?\{")
+
+
+def double_types(root: pathlib.Path) -> list[str]:
+    """Types that two headers define in namespace zeropose itself."""
+    places: dict[str, list[str]] = {}
+    for room in ALLOWED:
+        for path in sorted((root / room).glob("**/*.h")):
+            lines = path.read_text().splitlines()
+            if "namespace zeropose {" not in lines:
+                continue
+            for number, line in enumerate(lines, 1):
+                match = TYPE.match(line)
+                if match:
+                    places.setdefault(match.group(1), []).append(f"{path}:{number}")
+    return [f"{name} is defined in {' and '.join(where)}" for name, where in places.items() if len(where) > 1]
+
 
 def main() -> int:
     root = pathlib.Path(sys.argv[1])
-    broken = []
+    broken = double_types(root)
     files = 0
     for room, allowed in ALLOWED.items():
         for path in sorted((root / room).glob("**/*")):

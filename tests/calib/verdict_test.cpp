@@ -137,14 +137,14 @@ struct Example {
   std::string first_finding() const { return judge(problem, result).findings.front().text; }
 };
 
-TEST(Verdict, GoodWhereEverythingIsWell) {
+TEST(CalibrationVerdict, GoodWhereEverythingIsWell) {
   const Example example;
-  const Verdict verdict = judge(example.problem, example.result);
+  const CalibrationVerdict verdict = judge(example.problem, example.result);
   EXPECT_EQ(verdict.quality, Quality::good) << verdict.findings.front().text;
   EXPECT_THAT(verdict.summary, HasSubstr("Good"));
 }
 
-TEST(Verdict, NoResult) {
+TEST(CalibrationVerdict, NoResult) {
   Example example;
   example.result.status = CalibrationStatus::coplanar;
   example.result.reason = "all points lie in one plane";
@@ -152,7 +152,7 @@ TEST(Verdict, NoResult) {
   EXPECT_EQ(example.first_finding(), "all points lie in one plane");
 }
 
-TEST(Verdict, ResidualsAgainstTheNoise) {
+TEST(CalibrationVerdict, ResidualsAgainstTheNoise) {
   Example example;
   example.result.rms_px = 0.3;
   EXPECT_EQ(example.quality(), Quality::usable);
@@ -169,7 +169,7 @@ TEST(Verdict, ResidualsAgainstTheNoise) {
   EXPECT_EQ(example.quality(), Quality::not_usable);
 }
 
-TEST(Verdict, RejectedPoints) {
+TEST(CalibrationVerdict, RejectedPoints) {
   Example example;
   for (std::size_t i = 0; i < 10; ++i) example.result.deviations[5 * i + 22].used = false;
   EXPECT_EQ(example.quality(), Quality::usable);
@@ -178,7 +178,7 @@ TEST(Verdict, RejectedPoints) {
   EXPECT_EQ(example.quality(), Quality::not_usable);
 }
 
-TEST(Verdict, CoverageOfTheImage) {
+TEST(CalibrationVerdict, CoverageOfTheImage) {
   Example example;
   const Coverage all = coverage_of(example.problem, example.result);
   // Corners of the hull: (40, 30) .. (760, 570).
@@ -193,7 +193,7 @@ TEST(Verdict, CoverageOfTheImage) {
   EXPECT_THAT(judge(example.problem, example.result).findings[1].text, HasSubstr("cover 24 % of the image"));
 }
 
-TEST(Verdict, DepthOriginAndRedundancy) {
+TEST(CalibrationVerdict, DepthOriginAndRedundancy) {
   Example flat;
   for (auto& deviation : flat.result.deviations) deviation.depth_mm = 900;
   EXPECT_EQ(flat.quality(), Quality::usable);
@@ -209,10 +209,10 @@ TEST(Verdict, DepthOriginAndRedundancy) {
   EXPECT_EQ(unrefined.quality(), Quality::usable);
 }
 
-TEST(Verdict, StrongCorrelationsAreNamed) {
+TEST(CalibrationVerdict, StrongCorrelationsAreNamed) {
   Example example;
   example.result.uncertainty.covariance(0, 1) = example.result.uncertainty.covariance(1, 0) = 0.995;
-  const Verdict verdict = judge(example.problem, example.result);
+  const CalibrationVerdict verdict = judge(example.problem, example.result);
   EXPECT_EQ(verdict.quality, Quality::good);
   EXPECT_THAT(verdict.findings.back().text, HasSubstr("fx-cx"));
 }

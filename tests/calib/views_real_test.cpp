@@ -28,7 +28,7 @@ std::optional<std::string> data_file(const std::string& name) {
 
 struct Input {
   std::vector<ViewsCamera> cameras;
-  std::vector<View> views;
+  std::vector<BoardView> views;
   std::vector<ViewPoint> points;
   ViewsProblem problem() const {
     ViewsProblem given;

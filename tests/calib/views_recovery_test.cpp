@@ -160,9 +160,9 @@ TEST(ViewsRecovery, ARobustLossHoldsWrongPointsOff) {
   for (const std::size_t index : {7u, 90u, 100u, 300u})
     scene.points[index].point.u_px += Eigen::Vector2d(30, -20);
   ViewsProblem problem = scene.problem();
-  problem.loss_px = 0.1;
+  problem.robust = 0.1;
   const ViewsResult robust = calibrate_views(problem);
-  problem.loss_px = 0;
+  problem.robust = 0;
   const ViewsResult plain = calibrate_views(problem);
   ASSERT_EQ(robust.status, CalibrationStatus::ok) << robust.reason;
   ASSERT_EQ(plain.status, CalibrationStatus::ok) << plain.reason;

@@ -12,7 +12,7 @@ namespace zeropose::test {
 
 struct ViewsScene {
   std::vector<ViewsCamera> cameras;
-  std::vector<View> views;
+  std::vector<BoardView> views;
   std::vector<ViewPoint> points;
   // Truth.
   std::vector<CameraModel> models;

@@ -145,6 +145,8 @@ class BestFit(Case):
         self.expect_near(answer["X_AB"], self.POSE, 1e-9)
         self.assertEqual(len(answer["residuals"]), 5)
         self.assertLess(answer["rms_mm"], 1e-9)
+        self.assertLess(answer["sigma_mm"], 1e-9)
+        self.assertEqual([len(row) for row in answer["covariance"]], [6] * 6)
 
     def test_weight_zero_is_left_out(self):
         path = self.points(self.POSE, self.CORNERS, ",weight", [1, 1, 1, 2, 0])

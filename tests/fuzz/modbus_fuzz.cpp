@@ -72,7 +72,7 @@ class Link {
     if (!decoded) return;
     if (require_crc_) require(encode_command(*decoded) == registers, "a command has its CRC");
     const CommandOutcome outcome = handshake_.on_command(*decoded, 1, now_);
-    if (outcome.verdict != Verdict::accepted) {
+    if (outcome.verdict != CommandVerdict::accepted) {
       require(handshake_.block(now_) == before, "a refused command changes nothing");
       require(!outcome.request, "a refused command starts nothing");
       return;

@@ -51,7 +51,7 @@ std::vector<ViewPoint> photograph(test::BoardScene scene, bool tell_radius, doub
 ViewsResult calibrated(const test::BoardScene& scene, const std::vector<ViewPoint>& points) {
   const std::vector<ViewsCamera> cameras{
       {"camera", scene.camera.width_px, scene.camera.height_px, LensModel::division, {}, {}, false}};
-  std::vector<View> views(pictures);
+  std::vector<BoardView> views(pictures);
   for (int k = 0; k < pictures; ++k) views[static_cast<std::size_t>(k)].name = std::to_string(k);
   ViewsProblem problem;
   problem.cameras = cameras;

@@ -107,22 +107,22 @@ class Model {
     const auto outcome =
         handshake_.on_command({id, static_cast<std::uint16_t>(kind), 1, 2, argument}, from, now_);
     if (executing()) {
-      ASSERT_EQ(outcome.verdict, Verdict::busy);
+      ASSERT_EQ(outcome.verdict, CommandVerdict::busy);
       ++busy_seen;
       return;
     }
-    ASSERT_NE(outcome.verdict, Verdict::busy);
+    ASSERT_NE(outcome.verdict, CommandVerdict::busy);
     if (kind == CommandKind::acknowledge) {
       const bool fits = id != 0 && id == last_id_ && owner_ == from;
-      ASSERT_EQ(outcome.verdict == Verdict::accepted, fits);
+      ASSERT_EQ(outcome.verdict == CommandVerdict::accepted, fits);
       if (fits) withdraw();
       return;
     }
     if (id == 0 || id == last_id_) {
-      ASSERT_EQ(outcome.verdict, Verdict::wrong_request_id);
+      ASSERT_EQ(outcome.verdict, CommandVerdict::wrong_request_id);
       return;
     }
-    if (outcome.verdict != Verdict::accepted || kind == CommandKind::heartbeat) return;
+    if (outcome.verdict != CommandVerdict::accepted || kind == CommandKind::heartbeat) return;
     accepted(kind, id, from, outcome);
   }
 

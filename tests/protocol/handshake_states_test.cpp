@@ -19,7 +19,7 @@ TEST_F(HandshakeTest, EveryOtherCommandWithdrawsExceptHeartbeat) {
                           CommandKind::at_position, CommandKind::resume, CommandKind::halt}) {
     measure(++id);
     report(ok_report(id));
-    EXPECT_EQ(command(CommandKind::heartbeat, 1000).verdict, Verdict::accepted);
+    EXPECT_EQ(command(CommandKind::heartbeat, 1000).verdict, CommandVerdict::accepted);
     expect_valid(id);
     command(kind, ++id);
     EXPECT_FALSE(block().has(status_bit::result_valid));
@@ -31,23 +31,23 @@ TEST_F(HandshakeTest, EveryOtherCommandWithdrawsExceptHeartbeat) {
 TEST_F(HandshakeTest, HeartbeatIsNoCommandThatCouldHideADuplicate) {
   measure(1);
   report(ok_report(1));
-  EXPECT_EQ(command(CommandKind::heartbeat, 0).verdict, Verdict::wrong_request_id);
-  EXPECT_EQ(command(CommandKind::heartbeat, 2, 1).verdict, Verdict::wrong_argument);
+  EXPECT_EQ(command(CommandKind::heartbeat, 0).verdict, CommandVerdict::wrong_request_id);
+  EXPECT_EQ(command(CommandKind::heartbeat, 2, 1).verdict, CommandVerdict::wrong_argument);
   command(CommandKind::heartbeat, 2, 0, other);
   EXPECT_EQ(handshake->owner(), robot);
-  EXPECT_EQ(measure(1).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::wrong_request_id);
   EXPECT_EQ(handshake->counters().heartbeats, 1u);
 }
 
 TEST_F(HandshakeTest, AcknowledgeNeedsOwnerAndId) {
   measure(5);
   report(ok_report(5));
-  EXPECT_EQ(command(CommandKind::acknowledge, 4).verdict, Verdict::wrong_acknowledge);
-  EXPECT_EQ(command(CommandKind::acknowledge, 0).verdict, Verdict::wrong_acknowledge);
-  EXPECT_EQ(command(CommandKind::acknowledge, 5, 0, other).verdict, Verdict::wrong_acknowledge);
-  EXPECT_EQ(command(CommandKind::acknowledge, 5, 1).verdict, Verdict::wrong_argument);
+  EXPECT_EQ(command(CommandKind::acknowledge, 4).verdict, CommandVerdict::wrong_acknowledge);
+  EXPECT_EQ(command(CommandKind::acknowledge, 0).verdict, CommandVerdict::wrong_acknowledge);
+  EXPECT_EQ(command(CommandKind::acknowledge, 5, 0, other).verdict, CommandVerdict::wrong_acknowledge);
+  EXPECT_EQ(command(CommandKind::acknowledge, 5, 1).verdict, CommandVerdict::wrong_argument);
   expect_valid(5);
-  EXPECT_EQ(command(CommandKind::acknowledge, 5).verdict, Verdict::accepted);
+  EXPECT_EQ(command(CommandKind::acknowledge, 5).verdict, CommandVerdict::accepted);
   expect_withdrawn();
 }
 
@@ -60,7 +60,7 @@ TEST_F(HandshakeTest, OwnerLostWithdrawsAndStartsANewSession) {
   handshake->on_disconnect(robot, now);
   expect_withdrawn();
   EXPECT_EQ(block().epoch, 101u);
-  EXPECT_EQ(measure(1, other).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(measure(1, other).verdict, CommandVerdict::wrong_request_id);
 }
 
 TEST_F(HandshakeTest, OwnerLostWhileBusy) {
@@ -68,11 +68,11 @@ TEST_F(HandshakeTest, OwnerLostWhileBusy) {
   handshake->on_disconnect(robot, now);
   EXPECT_EQ(block().status, status_bit::busy);  // the cycle is still at work
   EXPECT_EQ(block().request_id, 0u);
-  EXPECT_EQ(measure(2, other).verdict, Verdict::busy);
+  EXPECT_EQ(measure(2, other).verdict, CommandVerdict::busy);
   report(ok_report(1));
   expect_withdrawn();
   EXPECT_EQ(handshake->counters().orphaned_reports, 1u);
-  EXPECT_EQ(measure(2, other).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(2, other).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, OwnerLostAndNoReport) {
@@ -80,7 +80,7 @@ TEST_F(HandshakeTest, OwnerLostAndNoReport) {
   handshake->on_disconnect(robot, now);
   wait(500);
   expect_withdrawn();
-  EXPECT_EQ(measure(2, other).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(2, other).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, EpochIsNeverZero) {
@@ -99,7 +99,7 @@ TEST_F(HandshakeTest, MeasureWhenNotReadyGetsItsCode) {
     change(cell);
     handshake->set_cell_state(cell, now);
     const auto outcome = measure(++id);
-    EXPECT_EQ(outcome.verdict, Verdict::accepted);
+    EXPECT_EQ(outcome.verdict, CommandVerdict::accepted);
     EXPECT_FALSE(outcome.request);
     EXPECT_TRUE(block().has(status_bit::not_ok));
     return block().code;
@@ -225,7 +225,7 @@ TEST_F(HandshakeTest, HaltAndResume) {
   EXPECT_EQ(block().state, LinkState::halted);
   command(CommandKind::resume, 6);
   EXPECT_EQ(block().state, LinkState::ready);
-  EXPECT_EQ(measure(7).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(7).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, InternalErrorIsLatchedUntilAcknowledged) {

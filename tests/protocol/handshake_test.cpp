@@ -41,7 +41,7 @@ TEST_F(HandshakeTest, SimulatedCellsSaySo) {
 
 TEST_F(HandshakeTest, WholeSequence) {
   const auto outcome = handshake->on_command({42, 1, 5, 6, -70000}, robot, now);
-  ASSERT_EQ(outcome.verdict, Verdict::accepted);
+  ASSERT_EQ(outcome.verdict, CommandVerdict::accepted);
   ASSERT_TRUE(outcome.request);
   EXPECT_EQ(outcome.request->robot, 7u);
   EXPECT_EQ(outcome.request->kind, CommandKind::measure);
@@ -74,7 +74,7 @@ TEST_F(HandshakeTest, WholeSequence) {
   EXPECT_EQ(b.config_hash, 0x11111111u);
   EXPECT_EQ(b.calibration_hash, 0x22222222u);
   EXPECT_EQ(b.zero_id, 0x33333333u);
-  EXPECT_EQ(command(CommandKind::acknowledge, 42).verdict, Verdict::accepted);
+  EXPECT_EQ(command(CommandKind::acknowledge, 42).verdict, CommandVerdict::accepted);
   expect_withdrawn();
   EXPECT_EQ(block().state, LinkState::ready);
 }
@@ -99,9 +99,9 @@ TEST_F(HandshakeTest, SecondCommandWhileBusyDisturbsNothing) {
   const ResultBlock before = block();
   for (int kind = 0; kind < 12; ++kind) {
     EXPECT_EQ(handshake->on_command({9, static_cast<std::uint16_t>(kind), 5, 6, 0}, other, now).verdict,
-              Verdict::busy);
+              CommandVerdict::busy);
     EXPECT_EQ(handshake->on_command({1, static_cast<std::uint16_t>(kind), 5, 6, 0}, robot, now).verdict,
-              Verdict::busy);
+              CommandVerdict::busy);
   }
   EXPECT_EQ(block(), before);
   report(ok_report(1));
@@ -110,16 +110,16 @@ TEST_F(HandshakeTest, SecondCommandWhileBusyDisturbsNothing) {
 }
 
 TEST_F(HandshakeTest, RequestIdZeroAndTheLastAgainAreRefused) {
-  EXPECT_EQ(measure(0).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(measure(0).verdict, CommandVerdict::wrong_request_id);
   measure(1);
   report(ok_report(1));
-  EXPECT_EQ(measure(1).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::wrong_request_id);
   expect_valid(1);
   command(CommandKind::acknowledge, 1);
-  EXPECT_EQ(measure(1).verdict, Verdict::wrong_request_id);
-  EXPECT_EQ(command(CommandKind::halt, 1).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::wrong_request_id);
+  EXPECT_EQ(command(CommandKind::halt, 1).verdict, CommandVerdict::wrong_request_id);
   EXPECT_EQ(handshake->counters().refused_request_id, 4u);
-  EXPECT_EQ(measure(2).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(2).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, ForeignReportsAreIgnored) {
@@ -168,11 +168,11 @@ TEST_F(HandshakeTest, AReportAtTheVeryDeadlineIsTooLate) {
 TEST_F(HandshakeTest, AnIdIsNotTakenAgainWhileItsLateReportIsToCome) {
   measure(1);
   wait(500);
-  EXPECT_EQ(command(CommandKind::resume, 2).verdict, Verdict::accepted);
-  EXPECT_EQ(measure(1).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(command(CommandKind::resume, 2).verdict, CommandVerdict::accepted);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::wrong_request_id);
   report(ok_report(1));
   expect_done(2);
-  EXPECT_EQ(measure(1).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, AnIdIsNotLostForEverWhenItsReportNeverComes) {
@@ -181,9 +181,9 @@ TEST_F(HandshakeTest, AnIdIsNotLostForEverWhenItsReportNeverComes) {
   command(CommandKind::resume, 2);
   expect_done(2);
   wait(59500);
-  EXPECT_EQ(measure(1).verdict, Verdict::wrong_request_id);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::wrong_request_id);
   wait(500);
-  EXPECT_EQ(measure(1).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(1).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, ZeroHasItsOwnDeadline) {
@@ -206,7 +206,8 @@ TEST_F(HandshakeTest, ValidityEnds) {
   wait(1);
   expect_withdrawn();
   EXPECT_EQ(handshake->counters().expired, 1u);
-  EXPECT_EQ(command(CommandKind::acknowledge, 1).verdict, Verdict::accepted);  // nothing left to withdraw
+  EXPECT_EQ(command(CommandKind::acknowledge, 1).verdict,
+            CommandVerdict::accepted);  // nothing left to withdraw
 }
 
 TEST_F(HandshakeTest, AgeIsRoundedUpAndSaturates) {
@@ -224,7 +225,7 @@ TEST_F(HandshakeTest, NotOkCarriesTheCodeAndNoValues) {
   report(not_ok_report(1, Code::limit_rz));
   expect_not_ok(1, 506);
   EXPECT_EQ(block().state, LinkState::ready);
-  EXPECT_EQ(measure(2).verdict, Verdict::accepted);
+  EXPECT_EQ(measure(2).verdict, CommandVerdict::accepted);
 }
 
 TEST_F(HandshakeTest, ValueOutOfRange) {
