@@ -83,30 +83,35 @@ class Freedom {
   }
 
   // The equations in the free parameters.
-  ViewEquations chosen(ViewEquations all, const Matrix6& pose) const {
-    all.N.rightCols<6>() *= pose;
-    all.N.bottomRows<6>() = pose.transpose() * all.N.bottomRows<6>();
-    all.g.tail<6>() = pose.transpose() * all.g.tail<6>();
+  ViewEquations chosen(const ViewEquations& all, const Matrix6& pose) const {
+    SmallMatrix N = all.N;
+    SmallVector g = all.g;
+    const Eigen::Index first = N.rows() - 6;
+    const Eigen::Matrix<double, Eigen::Dynamic, 6, 0, 15, 6> columns = N.rightCols<6>().lazyProduct(pose);
+    const Matrix6 own = pose.transpose().lazyProduct(columns.bottomRows<6>());
+    N.topRightCorner(first, 6) = columns.topRows(first);
+    N.bottomLeftCorner(6, first) = columns.topRows(first).transpose();
+    N.bottomRightCorner<6, 6>() = own;
+    g.tail<6>() = pose.transpose() * Vector6(all.g.tail<6>());
     if (one_focal_) {  // fy = fx / aspect
-      all.N.col(0) += all.N.col(1) / aspect_;
-      all.N.row(0) += all.N.row(1) / aspect_;
-      all.g(0) += all.g(1) / aspect_;
+      N.col(0) += N.col(1) / aspect_;
+      N.row(0) += N.row(1) / aspect_;
+      g(0) += g(1) / aspect_;
     }
-    ViewEquations chosen = all;
+    ViewEquations chosen;
     const auto n = static_cast<Eigen::Index>(list_.size());
     chosen.N.resize(n, n);
     chosen.g.resize(n);
     for (Eigen::Index i = 0; i < n; ++i) {
       const Eigen::Index row = places_[static_cast<std::size_t>(i)];
-      chosen.g(i) = all.g(row);
-      for (Eigen::Index j = 0; j < n; ++j) chosen.N(i, j) = all.N(row, places_[static_cast<std::size_t>(j)]);
+      chosen.g(i) = g(row);
+      for (Eigen::Index j = 0; j < n; ++j) chosen.N(j, i) = N(places_[static_cast<std::size_t>(j)], row);
     }
     return chosen;
   }
 
   State moved_by(const State& state, const SmallVector& step) const {
     State next = state;
-    SixNumbers six = to_six_numbers(state.X_WC);
     Vector6 delta = Vector6::Zero();
     for (std::size_t k = 0; k < list_.size(); ++k) {
       const double by = step(static_cast<Eigen::Index>(k));
@@ -126,6 +131,7 @@ class Freedom {
       next.X_WC = moved(state.X_WC, delta);
       return next;
     }
+    SixNumbers six = to_six_numbers(state.X_WC);
     six.x_mm += delta(0);
     six.y_mm += delta(1);
     six.z_mm += delta(2);
@@ -226,6 +232,11 @@ Descent descend(const RefineProblem& problem, const PointColumns& columns, const
     const double promised = step.dot(own.g);
     at.converged = promised <= last_step * at.equations.cost + rounding;
     State next = freedom.moved_by(at.state, own.scale.cwiseProduct(step));
+    if (at.converged) {  // nothing more is to be learnt there
+      at.state = std::move(next);
+      at.equations.cost = std::max(0.0, at.equations.cost - promised);
+      break;
+    }
     ViewEquations there = normal_equations(columns, next.model, next.X_WC, objective);
     const bool better = there.visible && there.cost <= at.equations.cost;
     if (better) {
@@ -235,7 +246,6 @@ Descent descend(const RefineProblem& problem, const PointColumns& columns, const
     } else {
       damping *= 10;
     }
-    if (at.converged) break;
     if (damping > largest_damping) {  // nothing is left but the rounding of the cost
       at.converged = promised <= 1e-9 * at.equations.cost;
       break;

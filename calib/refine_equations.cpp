@@ -8,7 +8,7 @@
 namespace zeropose {
 namespace {
 
-constexpr int block = 16;  // points at a time
+constexpr int block = 8;  // points at a time
 using Column = Eigen::Array<double, block, 1>;
 template <int n>
 using Rows = Eigen::Array<double, block, n>;
