@@ -88,8 +88,8 @@ Finding judge_fit(const CalibrationProblem& problem, const CalibrationResult& re
                                            number(noise_px, 3) + " px leaves"};
 }
 
-Finding judge_redundancy(const CalibrationResult& result) {
-  const int redundancy = redundancy_of(result);
+Finding judge_redundancy(const CalibrationResult& result, int further_unknowns) {
+  const int redundancy = redundancy_of(result) - further_unknowns;
   if (result.uncertainty.parameters.empty())
     return {Quality::usable, "without refinement there are no sigmas: nothing says how good the numbers are"};
   const std::string text =
@@ -199,7 +199,8 @@ Coverage coverage_of(const CalibrationProblem& problem, const CalibrationResult&
   return coverage;
 }
 
-CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationResult& result) {
+CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationResult& result,
+                         int further_unknowns) {
   CalibrationVerdict verdict;
   if (result.status != CalibrationStatus::ok) {
     verdict.summary = "Not usable: there is no result.";
@@ -208,7 +209,7 @@ CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationRes
   }
   const Coverage coverage = coverage_of(problem, result);
   const ReportedUncertainty uncertainty = reported_uncertainty(result.uncertainty, result.X_WC);
-  std::array findings{judge_fit(problem, result),     judge_redundancy(result),
+  std::array findings{judge_fit(problem, result),     judge_redundancy(result, further_unknowns),
                       judge_rejected(result),         judge_image(coverage),
                       judge_depth(coverage),          judge_origin(problem, uncertainty),
                       judge_correlations(uncertainty)};

@@ -38,6 +38,8 @@ struct CalibrationVerdict {
 
 // Compares residuals, coverage, sigma of the origin, redundancy, correlations and rejected points with the
 // limits of docs/calibration.md. A good fit alone is not enough: a wrong camera can have small residuals.
-CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationResult& result);
+// further_unknowns: estimated from the same points beside those in the result's uncertainty (poses of views).
+CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationResult& result,
+                         int further_unknowns = 0);
 
 }  // namespace zeropose

@@ -84,7 +84,7 @@ class Page {
   }
 
   void draw_verdict() {
-    const CalibrationVerdict verdict = judge(report_.problem, report_.result);
+    const CalibrationVerdict verdict = judge(report_.problem, report_.result, report_.further_unknowns);
     const double top = y_;
     struct Line {
       std::string text;

@@ -17,6 +17,7 @@ struct CalibrationReport {
   double sy_mm = 0;    // pixel pitch for the data-sheet form; 0: not known
   double frame_offset_z_mm = 0;
   std::optional<CalibratedCamera> active;  // the calibration in use, to compare with
+  int further_unknowns = 0;                // see judge()
 };
 
 // Parameters with sigmas, data-sheet form, verdict, deviations as quiver plot, histogram and list, coverage

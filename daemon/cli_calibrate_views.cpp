@@ -2,17 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 
 #include "calib/views.h"
+#include "config/atomic_file.h"
 #include "config/calibration_tables.h"
 #include "config/cameras.h"
 #include "config/csv.h"
 #include "config/files.h"
 #include "config/text.h"
 #include "daemon/cli_answer.h"
+#include "daemon/cli_views_report.h"
 
 namespace zeropose {
 namespace {
@@ -42,7 +45,7 @@ struct ViewsOptions {
   std::string points;
   int width_px = 0, height_px = 0;
   std::string model = "division";
-  std::optional<std::string> start, fix;
+  std::optional<std::string> start, fix, report;
   bool one_focal = false;
   double sigma_px = 0, reject_px = 0, robust = 0;
   bool json = false;
@@ -227,6 +230,18 @@ std::string text_of_result(const CalibrationViews& input, const ViewsResult& res
 // So many take long enough that somebody wants to see it go on.
 constexpr std::size_t many_points = 20000;
 
+// One camera: the file as named. A rig: with the camera's name before the extension, one page each.
+void write_pages(const std::filesystem::path& file, const std::filesystem::path& points,
+                 const CalibrationViews& input, const ViewsProblem& problem, const ViewsResult& result) {
+  const std::string source = concat({"Points: ", points.filename().string()});
+  for (std::size_t c = 0; c < input.cameras.size(); ++c) {
+    std::filesystem::path own = file;
+    if (input.cameras.size() > 1)
+      own.replace_filename(concat({file.stem().string(), "-", input.cameras[c], file.extension().string()}));
+    replace_file(own, page_of_camera(input, problem, result, c, source));
+  }
+}
+
 Answer calibrate_views_of(const ViewsOptions& options) {
   const CalibrationViews input = load_calibration_views(options.points);
   if (input.points.empty())
@@ -244,6 +259,8 @@ Answer calibrate_views_of(const ViewsOptions& options) {
                 << std::sqrt(2 * cost / static_cast<double>(input.points.size())) << " px\n";
     };
   const ViewsResult result = calibrate_views(problem);
+  if (options.report && result.status == CalibrationStatus::ok)
+    write_pages(*options.report, options.points, input, problem, result);
   return {result.status == CalibrationStatus::ok ? done : no_answer, json_of_result(input, result),
           text_of_result(input, result)};
 }
@@ -266,6 +283,8 @@ void add_options(CLI::App& verb, ViewsOptions& options) {
   verb.add_option("--robust", options.robust,
                   "Cauchy's loss: deviations of many times this, px, count little")
       ->check(CLI::Range(0.0, 1e6));
+  verb.add_option("--report", options.report,
+                  "the report as a page (SVG) to write; of a rig one per camera, PAGE-camera.svg");
   verb.add_flag("--json", options.json,
                 "one JSON object on stdout: status, reason, camera or cameras, sigma, correlation, views,\n"
                 "rms_px, sigma_px, deviations, rejected, diagnosis");

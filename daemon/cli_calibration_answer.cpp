@@ -165,7 +165,7 @@ Json cli::calibration_json(const CalibrationReport& report) {
   json["sigma_px"] = report.result.sigma_px;
   json["rms_px"] = report.result.rms_px;
   json["residual_sum"] = report.result.residual_sum;
-  json["verdict"] = verdict_json(judge(report.problem, report.result));
+  json["verdict"] = verdict_json(judge(report.problem, report.result, report.further_unknowns));
   json["coverage"] = coverage_json(coverage_of(report.problem, report.result));
   if (report.active) json["comparison"] = comparison_json(report);
   json["deviations"] = deviations_json(report);
@@ -177,7 +177,7 @@ Json cli::calibration_json(const CalibrationReport& report) {
 std::string cli::calibration_text(const CalibrationReport& report, bool rad) {
   const CalibrationResult& result = report.result;
   std::ostringstream text;
-  const CalibrationVerdict verdict = judge(report.problem, result);
+  const CalibrationVerdict verdict = judge(report.problem, result, report.further_unknowns);
   text << verdict.summary << "\n";
   for (const Finding& finding : verdict.findings)
     text << "  " << std::left << std::setw(11) << name_of(finding.quality) << std::right << finding.text
