@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""zeropose calibrate points, calibrate vanishing and convert camera through the real program: cameras made here from
+"""zeropose calibrate points, calibrate views, calibrate vanishing and convert camera through the real program: cameras made here from
 the formulas of spec 20, published measurements, wrong inputs. Usage: cli_calibrate_test.py ZEROPOSE SOURCE_DIR"""
 import json
 import math
@@ -232,6 +232,73 @@ class Points(Case):
         poseless = self.write("poseless.json", json.dumps({k: v for k, v in CAMERA.items() if k != "X_WC"}))
         self.expect_refused(run(*verb, *self.SIZE, "--active", poseless), "poseless.json: found no X_WC")
         self.expect_refused(run("calibrate", "points", "--points", self.write("a.csv", "x_mm\n1\n"), *self.SIZE), "a.csv:1: found no column")
+
+
+class Views(Case):
+    # X_CB of a board of 8 x 6 points, 30 mm apart, before the camera.
+    POSES = [[-100, -70, 850, 25, 0, 3], [-110, -80, 900, -25, 5, -10], [-90, -60, 800, 4, 28, 20],
+             [-120, -70, 870, -5, -30, 40], [-100, -90, 820, 20, 22, -35]]
+    BOARD = [[30 * i, 30 * j, 0] for j in range(6) for i in range(8)]
+
+    def table(self, cameras, sigma_px=0.0):
+        """cameras: name -> (camera, six numbers of the camera in the first camera's frame)"""
+        noise = random.Random(3)
+        lines = ["view,camera,x_mm,y_mm,z_mm,u_px,v_px"]
+        for view, X_CB in enumerate(self.POSES):
+            for name, (camera, X_FC) in cameras.items():
+                for p in self.BOARD:
+                    u, v = pixel(camera, into(X_FC, out_of(X_CB, p)))
+                    u, v = u + noise.gauss(0, sigma_px), v + noise.gauss(0, sigma_px)
+                    lines.append(",".join(map(repr, [view + 1, name, *p, u, v])).replace("'", ""))
+        return self.write("views.csv", "\n".join(lines))
+
+    def test_one_camera(self):
+        path = self.table({"left": (CAMERA, [0] * 6)})
+        page = self.path("page.svg")
+        status, answer, err = run_json("calibrate", "views", "--points", path, "--width", 768, "--height", 572,
+                                       "--report", page)
+        self.assertEqual((status, answer["status"]), (0, "ok"), err)
+        for name in ("fx", "fy", "cx", "cy"):
+            self.assertAlmostEqual(answer["camera"][name], CAMERA[name], delta=1e-4)
+        self.assertAlmostEqual(answer["camera"]["K"], CAMERA["K"], delta=1e-6)
+        self.assertEqual([view["view"] for view in answer["views"]], ["1", "2", "3", "4", "5"])
+        for view, six in zip(answer["views"], self.POSES):
+            for found, true in zip(view["X_CB"], six):
+                self.assertAlmostEqual(found, true, delta=1e-4)
+        self.assertLess(answer["rms_px"], 1e-6)
+        xml.dom.minidom.parse(str(page))
+
+    def test_a_rig(self):
+        right = dict(CAMERA, fx=1880.0, cx=370.0)
+        X_FC = [60, 5, -10, 2, -4, 1]
+        path = self.table({"left": (CAMERA, [0] * 6), "right": (right, X_FC)}, 0.05)
+        status, answer, err = run_json("calibrate", "views", "--points", path, "--width", 768, "--height", 572,
+                                       "--sigma-px", 0.05, "--report", self.path("rig.svg"))
+        self.assertEqual((status, answer["status"]), (0, "ok"), err)
+        self.assertAlmostEqual(answer["rms_px"], 0.05 * math.sqrt(2), delta=0.006)  # 480 points: 3.2 %, four of them
+        X_WC = answer["cameras"]["right"]["X_WC"]
+        for found, true, room in zip(X_WC, X_FC, [1.5, 1.5, 5, 0.3, 0.3, 0.05]):
+            self.assertAlmostEqual(found, true, delta=room)
+        self.assertEqual(len(answer["views"][0]["X_WB"]), 6)
+        for name in ("rig-left.svg", "rig-right.svg"):
+            xml.dom.minidom.parse(str(self.path(name)))
+
+    def test_no_answer(self):
+        path = self.table({"left": (CAMERA, [0] * 6)})
+        lines = path.read_text().splitlines()
+        one = self.write("one.csv", "\n".join(lines[:1] + [l for l in lines if l.startswith("1,")][:3]))
+        status, answer, _ = run_json("calibrate", "views", "--points", one, "--width", 768, "--height", 572)
+        self.assertEqual(status, 1)
+        self.assertNotEqual(answer["reason"], "")
+        self.assertNotIn("camera", {key for key in answer if answer[key]})
+
+    def test_wrong_input(self):
+        path = self.table({"left": (CAMERA, [0] * 6)})
+        self.expect_refused(run("calibrate", "views", "--points", path), "--width and --height")
+        self.expect_refused(run("calibrate", "views", "--points", path, "--width", 768, "--height", 572, "--fix", "x"),
+                            'found "x"')
+        self.expect_refused(run("calibrate", "views", "--points", "/no/file", "--width", 768, "--height", 572),
+                            "/no/file")
 
 
 class Vanishing(Case):
