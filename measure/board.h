@@ -24,9 +24,9 @@ struct BoardProblem {
   BoardKind kind = BoardKind::circles;
   int rows = 0, cols = 0;  // of circles, or of inner corners: at least 2 each, of a chessboard 3
   double pitch_mm = 0;     // circles: between neighbours in a row; asymmetric: half of that; side of a square
-  // Of circles: accept also a part of the board whose place on the board is not known. See BoardResult.
+  // Accept also a part of the board whose place on the board is not known. See BoardResult.
   bool partial = false;
-  double least_share = 0.3;     // of the circles, that must be found
+  double least_share = 0.3;     // of the circles or corners, that must be found
   double min_diameter_px = 6;   // of a circle's longer axis
   double min_axis_ratio = 0.2;  // of a circle: about 0.34 at a tilt of 70 degrees
   double min_contrast = 15;     // grey levels, of circles
@@ -83,7 +83,8 @@ struct BoardResult {
 // Pure and repeatable bit by bit. Circle centres by the same maximum-likelihood fit as marks; a circle that
 // is cut by the image's border or half hidden is missing, not biased. What does not lie on the grid (of the
 // plane seen through a lens with radial distortion) is left out as clutter. A chessboard must be seen as a
-// whole, with a light border round it.
+// whole, with a light border round it; with `partial` its largest rectangle of corners is found, and which of
+// its directions are the board's rows is then not known either.
 BoardResult find_board(const ImageView& image, const BoardProblem& problem);
 
 // The point's place in the board's frame, mm.

@@ -5,6 +5,7 @@
 #include <array>
 #include <optional>
 #include <tuple>
+#include <utility>
 
 #include "calib/words.h"
 #include "measure/chessboard_corners.h"
@@ -35,10 +36,19 @@ struct Corners {
   }
 };
 
-std::optional<Corners> detect(const ImageView& image, const BoardProblem& problem) {
-  Corners corners{problem.rows, problem.cols, chessboard_corners(image, problem.rows, problem.cols), {}};
-  if (corners.at_px.empty()) return std::nullopt;
-  return corners;
+std::optional<Corners> corners_from(ChessboardCorners found) {
+  if (found.at_px.empty()) return std::nullopt;
+  return Corners{found.rows, found.cols, std::move(found.at_px), {}};
+}
+
+// A part must fit into the board one way or the other, and be enough of it.
+std::optional<Corners> detect_part(const ImageView& image, const BoardProblem& problem) {
+  std::optional<Corners> part = corners_from(part_of_chessboard(image));
+  if (!part) return std::nullopt;
+  const auto [less, more] = std::minmax(part->rows, part->cols);
+  const auto [rows, cols] = std::minmax(problem.rows, problem.cols);
+  const bool enough = part->rows * part->cols >= problem.least_share * problem.rows * problem.cols;
+  return less <= rows && more <= cols && enough ? part : std::nullopt;
 }
 
 // How many corners could not be measured.
@@ -126,17 +136,22 @@ BoardResult listed(const BoardProblem& problem, const Corners& corners) {
 
 BoardResult find_chessboard(const ImageView& image, const BoardProblem& problem) {
   BoardResult result;
-  std::optional<Corners> corners = detect(image, problem);
+  BoardProblem seen = problem;  // the board, or the part of it that is seen
+  std::optional<Corners> corners = corners_from(chessboard_corners(image, problem.rows, problem.cols));
+  const bool part = !corners && problem.partial;
+  if (part) corners = detect_part(image, problem);
   const std::string wanted =
       number(problem.rows) + " x " + number(problem.cols) + " inner corners (rows x columns)";
   if (!corners) {
     result.status = BoardStatus::no_grid;
-    result.reason =
-        "found no chessboard of " + wanted +
-        ": all of it must be in the image with a light border round it, and the corners are counted, "
-        "not the squares";
+    result.reason = "found no chessboard of " + wanted +
+                    ": all of it must be in the image with a light border round it (or a part, if that is "
+                    "allowed), and the corners are counted, "
+                    "not the squares";
     return result;
   }
+  seen.rows = corners->rows;
+  seen.cols = corners->cols;
   const std::size_t failed = measure(image, *corners);
   const std::size_t count = corners->fits.size();
   if (double(count - failed) < problem.least_share * double(count)) {
@@ -147,8 +162,13 @@ BoardResult find_chessboard(const ImageView& image, const BoardProblem& problem)
   }
   for (SaddleFit& fit : corners->fits)
     if (!fit.converged) fit.u_px = corners->at_px[std::size_t(&fit - corners->fits.data())];
-  result = listed(problem, *corners);
-  if (failed > 0) result.reason = number(failed) + " of the " + wanted + " could not be measured";
+  result = listed(seen, *corners);
+  if (part && result.status == BoardStatus::found) {
+    result.place_known = false;
+    result.reason = "found " + number(seen.rows) + " x " + number(seen.cols) + " of the " + wanted +
+                    "; which ones is not known";
+  }
+  if (failed > 0 && !part) result.reason = number(failed) + " of the " + wanted + " could not be measured";
   return result;
 }
 

@@ -92,5 +92,45 @@ TEST(Chessboard, WrongSizeIsNotFound) {
   EXPECT_NE(result.reason.find("8 x 9 inner corners"), std::string::npos) << result.reason;
 }
 
+// The true row and column of the nearest corner.
+Eigen::Vector2i true_index(const BoardScene& scene, const Vector2d& u_px) {
+  Eigen::Vector2i best(0, 0);
+  double nearest = 1e9;
+  for (int row = 0; row < scene.rows; ++row)
+    for (int col = 0; col < scene.cols; ++col) {
+      const double distance = (scene.seen_px({row, col}) - u_px).norm();
+      if (distance < nearest) nearest = distance, best = {row, col};
+    }
+  EXPECT_LT(nearest, 0.08);
+  return best;
+}
+
+TEST(Chessboard, PartlyCoveredIsFoundInPartWhenThatIsAllowed) {
+  BoardScene scene = chess(7, 10);
+  scene.X_CB = board_pose(scene, 320, 35 * degree, 0.7, 0.2);
+  const double edge = scene.seen_px({3, 7}).x();
+  scene.covers.push_back({{{edge, -1}, {641, -1}, {641, 481}, {edge, 481}}, 90});
+  EXPECT_NE(find(scene).status, BoardStatus::found);
+  std::mt19937_64 random(1);
+  BoardProblem problem = scene.problem();
+  problem.partial = true;
+  const BoardResult result = find_board(expose(paint(scene), 2, random).view(), problem);
+  ASSERT_EQ(result.status, BoardStatus::found) << result.reason;
+  EXPECT_FALSE(result.place_known);
+  EXPECT_GE(result.points.size(), 7u * 5u);
+  // One shift and one turn by quarters carries all indices into the true ones, without a mirror.
+  const auto at = [&](std::size_t i) {
+    return Eigen::Vector2i(result.points[i].at.row, result.points[i].at.col);
+  };
+  const Eigen::Vector2i origin = true_index(scene, result.points[0].u_px);
+  ASSERT_EQ(at(1), Eigen::Vector2i(0, 1));
+  const Eigen::Vector2i by_col = true_index(scene, result.points[1].u_px) - origin;
+  const Eigen::Vector2i by_row(by_col.y(), -by_col.x());
+  EXPECT_EQ(by_col.squaredNorm(), 1);
+  for (std::size_t i = 0; i < result.points.size(); ++i)
+    EXPECT_EQ(true_index(scene, result.points[i].u_px), origin + at(i).x() * by_row + at(i).y() * by_col)
+        << i;
+}
+
 }  // namespace
 }  // namespace zeropose
