@@ -1,10 +1,12 @@
 // C7: the whole way from points to a camera.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "calib/calibration.h"
 #include "calib/calibration_checks.h"
+#include "calib/held_values.h"
 #include "calib/linear_methods.h"
 #include "calib/origin_search.h"
 #include "calib/point_layout.h"
@@ -123,50 +125,6 @@ std::string_view name_of(CalibrationMethod method) {
   return method == CalibrationMethod::noncoplanar ? "C2 non-coplanar" : "C3 linear";
 }
 
-// Values that are held are those of the start; what the linear methods do not know is 0.
-void take_held_values(const CalibrationProblem& problem, CameraModel& model) {
-  if (problem.lens == LensModel::brown) {
-    const double K = std::get<Division>(model.distortion).K;
-    // (E2) to fourth order: 1 + K r^2 + 2 K^2 r^4.
-    model.distortion = BrownConrady{K, 2 * K * K, 0, 0, 0};
-  }
-  const auto hold = [&](Parameter parameter, double& value, double start) {
-    if (problem.fixed.has(parameter)) value = start;
-  };
-  const CameraModel start = problem.start ? problem.start->model : CameraModel{};
-  if (auto* lens = std::get_if<Division>(&model.distortion))
-    hold(Parameter::K, lens->K, problem.start ? std::get<Division>(start.distortion).K : 0);
-  if (auto* lens = std::get_if<BrownConrady>(&model.distortion)) {
-    const BrownConrady held = problem.start ? std::get<BrownConrady>(start.distortion) : BrownConrady{};
-    hold(Parameter::k1, lens->k1, held.k1);
-    hold(Parameter::k2, lens->k2, held.k2);
-    hold(Parameter::p1, lens->p1, held.p1);
-    hold(Parameter::p2, lens->p2, held.p2);
-    hold(Parameter::k3, lens->k3, held.k3);
-  }
-  const Vector2d origin = first_origin(problem);
-  hold(Parameter::cx, model.cx_px, origin.x());
-  hold(Parameter::cy, model.cy_px, origin.y());
-  hold(Parameter::fx, model.fx_px, start.fx_px);
-  hold(Parameter::fy, model.fy_px, start.fy_px);
-}
-
-void take_held_pose(const CalibrationProblem& problem, Pose& X_WC) {
-  if (!problem.start || !problem.start->X_WC) return;
-  const SixNumbers held = to_six_numbers(*problem.start->X_WC);
-  SixNumbers six = to_six_numbers(X_WC);
-  const auto hold = [&](Parameter parameter, double& value, double start) {
-    if (problem.fixed.has(parameter)) value = start;
-  };
-  hold(Parameter::x, six.x_mm, held.x_mm);
-  hold(Parameter::y, six.y_mm, held.y_mm);
-  hold(Parameter::z, six.z_mm, held.z_mm);
-  hold(Parameter::rx, six.rx_deg, held.rx_deg);
-  hold(Parameter::ry, six.ry_deg, held.ry_deg);
-  hold(Parameter::rz, six.rz_deg, held.rz_deg);
-  X_WC = from_six_numbers(six);
-}
-
 void start_at_origin(const CalibrationProblem& problem, CalibrationMethod method, const Vector2d& origin_px,
                      Way& way) {
   const LinearResult linear = linear_start(problem, method, way, origin_px);
@@ -177,8 +135,8 @@ void start_at_origin(const CalibrationProblem& problem, CalibrationMethod method
   way.X_WC = linear.X_WC;
   way.model.width_px = problem.width_px;
   way.model.height_px = problem.height_px;
-  take_held_values(problem, way.model);
-  take_held_pose(problem, way.X_WC);
+  way.model = with_held_values(problem, way.model, first_origin(problem));
+  way.X_WC = with_held_pose(problem, way.X_WC);
 }
 
 // --- refinement
@@ -319,6 +277,7 @@ Way go(const CalibrationProblem& problem, std::span<const CalibrationPoint> poin
 std::vector<std::size_t> to_reject(const CalibrationProblem& problem,
                                    const std::vector<CalibrationDeviation>& deviations) {
   const auto excess = [&](const CalibrationDeviation& deviation) {
+    if (!deviation.dev_px.allFinite()) return std::numeric_limits<double>::infinity();
     double worst = 0;
     if (problem.reject_px > 0) worst = deviation.dev_px.norm() / problem.reject_px;
     if (problem.reject_mm > 0) worst = std::max(worst, deviation.dev_mm.norm() / problem.reject_mm);
@@ -327,9 +286,9 @@ std::vector<std::size_t> to_reject(const CalibrationProblem& problem,
   double worst = 1;
   for (const CalibrationDeviation& deviation : deviations) worst = std::max(worst, excess(deviation));
   std::vector<std::size_t> rejected;
-  if (!(worst > 1)) return rejected;
+  if (!(problem.reject_px > 0 || problem.reject_mm > 0)) return rejected;
   for (std::size_t i = 0; i < deviations.size(); ++i)
-    if (excess(deviations[i]) > std::max(1.0, 0.5 * worst)) rejected.push_back(i);
+    if (excess(deviations[i]) > 1 && excess(deviations[i]) >= 0.5 * worst) rejected.push_back(i);
   return rejected;
 }
 

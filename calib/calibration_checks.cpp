@@ -14,9 +14,7 @@ using Eigen::Vector2d;
 using enum CalibrationStatus;
 
 constexpr double smallest_body_mm = 5, largest_body_mm = 50000;
-constexpr double covered_well = 0.5;    // of the image's diagonal
-constexpr double close_to_one = 0.995;  // a correlation
-constexpr double loose_origin_px = 10, loose_focal = 0.01;
+constexpr double loose_focal = 0.01;
 
 InputFault wrong(std::string reason) { return {wrong_problem, std::move(reason)}; }
 
@@ -46,20 +44,13 @@ void warn_of_repetitions(const CalibrationProblem& problem, std::vector<std::str
                        " rows are exact repetitions: they add weight, but no knowledge");
 }
 
-void warn_of_coverage(const CalibrationProblem& problem, std::vector<std::string>& warnings) {
-  Vector2d low = problem.points.front().u_px, high = low;
-  for (const CalibrationPoint& point : problem.points) {
-    low = low.cwiseMin(point.u_px);
-    high = high.cwiseMax(point.u_px);
-  }
-  const double covered = (high - low).norm() / std::hypot(problem.width_px, problem.height_px);
-  if (covered < covered_well)
-    warnings.push_back("the points cover " + number(100 * covered, 0) +
-                       " % of the image's diagonal: the lens outside of them is extrapolated");
-  if (low.x() < -0.5 || low.y() < -0.5 || high.x() > problem.width_px - 0.5 ||
-      high.y() > problem.height_px - 0.5)
-    warnings.push_back("pixels lie outside the image of " + number(problem.width_px) + " x " +
-                       number(problem.height_px) + ": is the size right?");
+void warn_of_size(const CalibrationProblem& problem, std::vector<std::string>& warnings) {
+  for (const CalibrationPoint& point : problem.points)
+    if (!in_image({problem.width_px, problem.height_px}, point.u_px)) {
+      warnings.push_back("pixels lie outside the image of " + number(problem.width_px) + " x " +
+                         number(problem.height_px) + ": is the size right?");
+      return;
+    }
 }
 
 void warn_of_plane(const CalibrationProblem& problem, const CalibrationResult& result,
@@ -82,28 +73,11 @@ double sigma_of(const CalibrationResult& result, Parameter parameter) {
   return std::sqrt(result.uncertainty.covariance(i, i));
 }
 
-void warn_of_sigmas(const CalibrationResult& result, std::vector<std::string>& warnings) {
-  const double origin = std::max(sigma_of(result, Parameter::cx), sigma_of(result, Parameter::cy));
-  if (origin > loose_origin_px)
-    warnings.push_back("the image origin is known to " + number(origin, 1) +
-                       " px only (one sigma): more points, more depth, or the origin held");
+void warn_of_focal(const CalibrationResult& result, std::vector<std::string>& warnings) {
   const double focal = sigma_of(result, Parameter::fx) / result.model.fx_px;
   if (focal > loose_focal)
     warnings.push_back("the focal length is known to " + number(100 * focal, 1) +
                        " % only (one sigma): tilt the board more, or use points with more depth");
-}
-
-void warn_of_correlations(const CalibrationResult& result, std::vector<std::string>& warnings) {
-  const auto& [list, covariance] = result.uncertainty;
-  for (std::size_t i = 0; i < list.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j) {
-      const auto a = static_cast<Eigen::Index>(i), b = static_cast<Eigen::Index>(j);
-      const double correlation = covariance(a, b) / std::sqrt(covariance(a, a) * covariance(b, b));
-      if (std::abs(correlation) > close_to_one)
-        warnings.push_back(std::string(name_of(list[j])) + " and " + std::string(name_of(list[i])) +
-                           " are correlated by " + number(correlation, 4) +
-                           ": their errors cancel in this view only");
-    }
 }
 
 }  // namespace
@@ -160,10 +134,9 @@ void add_warnings(const CalibrationProblem& problem, const PointLayout& layout, 
   std::vector<std::string>& warnings = result.diagnosis.warnings;
   warn_of_units(layout, warnings);
   warn_of_repetitions(problem, warnings);
-  warn_of_coverage(problem, warnings);
+  warn_of_size(problem, warnings);
   warn_of_plane(problem, result, warnings);
-  warn_of_sigmas(result, warnings);
-  warn_of_correlations(result, warnings);
+  warn_of_focal(result, warnings);
 }
 
 std::string_view name_of(CalibrationStatus status) {

@@ -18,6 +18,7 @@ double rms_of(const std::vector<CalibrationDeviation>& deviations);
 
 std::optional<InputFault> options_fault(const CalibrationProblem& problem);
 
+// What the verdict (verdict.h) does not judge: units, repetitions, sizes, what one plane leaves open.
 void add_warnings(const CalibrationProblem& problem, const PointLayout& layout, CalibrationResult& result);
 
 }  // namespace zeropose

@@ -50,12 +50,7 @@ Centred centred(std::span<const CalibrationPoint> points) {
   Centred result;
   for (const CalibrationPoint& point : points) result.centroid_mm += point.p_W_mm;
   result.centroid_mm /= static_cast<double>(points.size());
-  double sum = 0;
-  for (const CalibrationPoint& point : points) {
-    result.p_mm.push_back(point.p_W_mm - result.centroid_mm);
-    sum += result.p_mm.back().squaredNorm();
-  }
-  result.scale_mm = std::sqrt(sum / static_cast<double>(points.size()));
+  for (const CalibrationPoint& point : points) result.p_mm.push_back(point.p_W_mm - result.centroid_mm);
   return result;
 }
 

@@ -27,7 +27,6 @@ LeastSquares least_squares(const Eigen::MatrixXd& A, const Eigen::VectorXd& b);
 struct Centred {
   std::vector<Eigen::Vector3d> p_mm;
   Eigen::Vector3d centroid_mm = Eigen::Vector3d::Zero();
-  double scale_mm = 1;  // root mean square distance
 };
 Centred centred(std::span<const CalibrationPoint> points);
 

@@ -3,7 +3,9 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "calib/homography.h"
 #include "calib/linear_methods.h"
 #include "calib/linear_parts.h"
 #include "calib/words.h"
@@ -172,21 +174,16 @@ double tilt_deg(const Matrix2d& B) {
 }
 
 // How much the depth of the plane's points changes across them, relative: from the homography, which needs
-// neither origin nor focal length.
+// neither origin nor focal length. Infinite where there is no homography: then something else is wrong.
 double depth_change(const Pairs& pairs) {
-  const Eigen::Index n = static_cast<Eigen::Index>(pairs.p_mm.size());
-  MatrixXd A = MatrixXd::Zero(2 * n, 9);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const Vector2d x = pairs.x_px[k] / pairs.pixel_scale, p = pairs.p_mm[k].head<2>() / pairs.point_scale;
-    A.row(2 * i) << p.x(), p.y(), 1, 0, 0, 0, -x.x() * p.x(), -x.x() * p.y(), -x.x();
-    A.row(2 * i + 1) << 0, 0, 0, p.x(), p.y(), 1, -x.y() * p.x(), -x.y() * p.y(), -x.y();
-  }
-  const VectorXd h = null_vector(A).x;
+  std::vector<SeenPoint> seen;
+  for (std::size_t i = 0; i < pairs.p_mm.size(); ++i) seen.push_back({pairs.p_mm[i], pairs.x_px[i]});
+  const auto H = homography(seen);
+  if (!H) return std::numeric_limits<double>::infinity();
   double largest = 0;
   for (const Vector3d& p : pairs.p_mm)
-    largest = std::max(largest, std::abs(h.segment<2>(6).dot(p.head<2>()) / pairs.point_scale));
-  return largest / std::abs(h(8));
+    largest = std::max(largest, std::abs(H->row(2).head<2>().dot(p.head<2>())));
+  return largest / std::abs((*H)(2, 2));
 }
 
 LinearResult parallel(const LinearProblem& problem, const Pairs& pairs, const Matrix2d& B, const Vector2d& t,

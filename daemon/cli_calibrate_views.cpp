@@ -15,6 +15,7 @@
 #include "config/files.h"
 #include "config/text.h"
 #include "daemon/cli_answer.h"
+#include "daemon/cli_calibration_answer.h"
 #include "daemon/cli_views_report.h"
 
 namespace zeropose {
@@ -105,27 +106,8 @@ std::vector<ViewsCamera> cameras_of(const ViewsOptions& options, const std::vect
   return cameras;
 }
 
-// By the parameter's name.
-Json sigma_json(const ParameterCovariance& uncertainty) {
-  Json json = Json::object();
-  for (std::size_t i = 0; i < uncertainty.parameters.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    json[std::string(name_of(uncertainty.parameters[i]))] = std::sqrt(uncertainty.covariance(k, k));
-  }
-  return json;
-}
-
-Json correlation_json(const ParameterCovariance& uncertainty) {
-  Json names = Json::array(), rows = Json::array();
-  const Eigen::VectorXd sigma = uncertainty.covariance.diagonal().cwiseSqrt();
-  for (Eigen::Index i = 0; i < sigma.size(); ++i) {
-    names.push_back(name_of(uncertainty.parameters[static_cast<std::size_t>(i)]));
-    Json row = Json::array();
-    for (Eigen::Index j = 0; j < sigma.size(); ++j)
-      row.push_back(uncertainty.covariance(i, j) / (sigma[i] * sigma[j]));
-    rows.push_back(row);
-  }
-  return {{"parameters", names}, {"matrix", rows}};
+ReportedUncertainty internals_of(const ViewsResult& result, std::size_t camera) {
+  return reported_uncertainty(result.cameras[camera].internals, result.cameras[camera].X_WC);
 }
 
 // Six numbers' sigmas: mm along and degrees about the axes of the frame that the pose is given in.
@@ -150,8 +132,8 @@ void add_cameras(Json& json, const CalibrationViews& input, const ViewsResult& r
   Json sigma, correlation, rms, pose_sigma;
   for (std::size_t c = 0; c < input.cameras.size(); ++c) {
     const std::string& name = input.cameras[c];
-    sigma[name] = sigma_json(result.cameras[c].internals);
-    correlation[name] = correlation_json(result.cameras[c].internals);
+    sigma[name] = sigma_json(internals_of(result, c));
+    correlation[name] = correlation_json(internals_of(result, c));
     pose_sigma[name] = pose_sigma_json(result.cameras[c].pose_covariance);
     rms[name] = result.cameras[c].rms_px;
   }
@@ -215,7 +197,7 @@ std::string text_of_result(const CalibrationViews& input, const ViewsResult& res
   const Json cameras = cameras_json(input, result);
   for (std::size_t c = 0; c < input.cameras.size(); ++c) {
     text << input.cameras[c] << ":\n  " << cameras.at(input.cameras[c]).dump() << "\n  sigma "
-         << sigma_json(result.cameras[c].internals).dump() << "\n";
+         << sigma_json(internals_of(result, c)).dump() << "\n";
   }
   text << (input.cameras.size() > 1 ? "X_WB" : "X_CB") << " of the views, mm and degrees, and rms, px:\n";
   for (std::size_t v = 0; v < result.views.size(); ++v)

@@ -5,7 +5,6 @@
 
 #include "calib/comparison.h"
 #include "calib/data_sheet.h"
-#include "calib/uncertainty.h"
 #include "calib/verdict.h"
 #include "config/calibration_rows.h"
 #include "config/cameras.h"
@@ -16,19 +15,6 @@ namespace zeropose {
 namespace {
 
 using namespace cli;
-
-Json uncertainty_json(const ReportedUncertainty& uncertainty, Json& correlation) {
-  Json sigma = Json::object();
-  correlation = Json::object();
-  for (std::size_t i = 0; i < uncertainty.parameters.size(); ++i) {
-    const std::string name(name_of(uncertainty.parameters[i]));
-    sigma[name] = uncertainty.sigma(static_cast<Eigen::Index>(i));
-    for (std::size_t j = 0; j < uncertainty.parameters.size(); ++j)
-      correlation[name][std::string(name_of(uncertainty.parameters[j]))] =
-          uncertainty.correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-  }
-  return sigma;
-}
 
 Json data_sheet_json(const CameraModel& model, double pitch_mm) {
   const DataSheet sheet = data_sheet(model, pitch_mm);
@@ -150,6 +136,23 @@ void print_worst_points(std::ostream& text, const CalibrationReport& report) {
 
 }  // namespace
 
+Json cli::sigma_json(const ReportedUncertainty& uncertainty) {
+  Json sigma = Json::object();
+  for (std::size_t i = 0; i < uncertainty.parameters.size(); ++i)
+    sigma[std::string(name_of(uncertainty.parameters[i]))] = uncertainty.sigma(static_cast<Eigen::Index>(i));
+  return sigma;
+}
+
+Json cli::correlation_json(const ReportedUncertainty& uncertainty) {
+  Json correlation = Json::object();
+  const auto& names = uncertainty.parameters;
+  for (std::size_t i = 0; i < names.size(); ++i)
+    for (std::size_t j = 0; j < names.size(); ++j)
+      correlation[std::string(name_of(names[i]))][std::string(name_of(names[j]))] =
+          uncertainty.correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+  return correlation;
+}
+
 Json cli::calibration_json(const CalibrationReport& report) {
   const Pose X_WC = with_frame_offset(report.result.X_WC, report.frame_offset_z_mm);
   Json json = {{"status", "ok"}, {"reason", ""}};
@@ -157,11 +160,10 @@ Json cli::calibration_json(const CalibrationReport& report) {
   json["X_CW"] = six_of(X_WC.inverse());
   json["frame_offset_z_mm"] = report.frame_offset_z_mm;
   if (report.sy_mm > 0) json["data_sheet"] = data_sheet_json(report.result.model, report.sy_mm);
-  Json correlation;
-  json["sigma"] = uncertainty_json(
-      reported_uncertainty(report.result.uncertainty, report.result.X_WC, report.frame_offset_z_mm),
-      correlation);
-  json["correlation"] = correlation;
+  const ReportedUncertainty uncertainty =
+      reported_uncertainty(report.result.uncertainty, report.result.X_WC, report.frame_offset_z_mm);
+  json["sigma"] = sigma_json(uncertainty);
+  json["correlation"] = correlation_json(uncertainty);
   json["sigma_px"] = report.result.sigma_px;
   json["rms_px"] = report.result.rms_px;
   json["residual_sum"] = report.result.residual_sum;

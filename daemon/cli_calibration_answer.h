@@ -1,12 +1,17 @@
-// What calibrate points answers: for programs and for people.
+// What the calibrations answer: for programs and for people.
 #pragma once
 
 #include <string>
 
+#include "calib/uncertainty.h"
 #include "config/calibration_page.h"
 #include "daemon/cli_answer.h"
 
 namespace zeropose::cli {
+
+// By the parameters' names.
+Json sigma_json(const ReportedUncertainty& uncertainty);
+Json correlation_json(const ReportedUncertainty& uncertainty);
 
 // The keys of spec 92 and more: X_CW, verdict, coverage, comparison. The result's status must be ok.
 Json calibration_json(const CalibrationReport& report);

@@ -2,29 +2,18 @@
 // peers that are named there: root of the mean squared point distance.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <filesystem>
 #include <map>
 #include <optional>
 
 #include "calib/views.h"
 #include "tests/support/csv.h"
 #include "tests/support/poses.h"
+#include "tests/support/shared_data.h"
 
 namespace zeropose {
 namespace {
 
 using test::CsvTable;
-
-// Relative to the sources, as CsvTable wants it; nullopt: not there.
-std::optional<std::string> data_file(const std::string& name) {
-  const char* given = std::getenv("ZEROPOSE_DATA");
-  const std::filesystem::path sources = ZEROPOSE_SOURCE_DIR;
-  const std::filesystem::path file =
-      (given != nullptr ? std::filesystem::path(given) : sources / "../shared/data") / "real" / name;
-  if (!std::filesystem::exists(file)) return std::nullopt;
-  return std::filesystem::relative(file, sources).string();
-}
 
 struct Input {
   std::vector<ViewsCamera> cameras;
@@ -56,8 +45,8 @@ Input input_of(const CsvTable& table, int width, int height, const ParameterSet&
 }
 
 TEST(ViewsRealData, ZhangsFiveViews) {
-  const auto file = data_file("zhang/points.csv");
-  if (!file) GTEST_SKIP() << "skipped: data not found";
+  const auto file = test::shared_data("real/zhang/points.csv");
+  if (!file) GTEST_SKIP() << test::data_not_found;
   const Input input = input_of(CsvTable(*file), 640, 480, {Parameter::p1, Parameter::p2, Parameter::k3}, 0);
   const ViewsResult result = calibrate_views(input.problem());
   ASSERT_EQ(result.status, CalibrationStatus::ok) << result.reason;
@@ -88,9 +77,9 @@ Pose published_pose(const CsvTable& table, std::size_t row) {
 }
 
 TEST(ViewsRealData, TwentyOneImagesOfASheet) {
-  const auto points = data_file("dbat_camcal/points.csv"),
-             poses = data_file("dbat_camcal/reference_eo_dbat.csv");
-  if (!points || !poses) GTEST_SKIP() << "skipped: data not found";
+  const auto points = test::shared_data("real/dbat_camcal/points.csv"),
+             poses = test::shared_data("real/dbat_camcal/reference_eo_dbat.csv");
+  if (!points || !poses) GTEST_SKIP() << test::data_not_found;
   const Input input = input_of(CsvTable(*points), 2272, 1704, {Parameter::k3}, 0.5);
   const ViewsResult result = calibrate_views(input.problem());
   ASSERT_EQ(result.status, CalibrationStatus::ok) << result.reason;
@@ -109,8 +98,8 @@ TEST(ViewsRealData, TwentyOneImagesOfASheet) {
 }
 
 TEST(ViewsRealData, BoardOnARobotsWrist) {
-  const auto file = data_file("rct_charuco_handeye/points.csv");
-  if (!file) GTEST_SKIP() << "skipped: data not found";
+  const auto file = test::shared_data("real/rct_charuco_handeye/points.csv");
+  if (!file) GTEST_SKIP() << test::data_not_found;
   const Input input = input_of(CsvTable(*file), 1600, 1200, {Parameter::k3}, 0);
   const ViewsResult result = calibrate_views(input.problem());
   ASSERT_EQ(result.status, CalibrationStatus::ok) << result.reason;

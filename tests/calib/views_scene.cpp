@@ -1,44 +1,14 @@
 #include "views_scene.h"
 
-#include <opencv2/calib3d.hpp>
+#include "tests/support/synthetic_camera.h"
 
 namespace zeropose::test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-namespace {
-
-// rd with rd / (1 + K rd^2) = ru, by halving an interval on which the left side rises.
-double distorted_radius(double K, double ru) {
-  double low = 0, high = K > 0 ? 1 / std::sqrt(K) : 2 * ru;
-  for (int step = 0; step < 200; ++step) {
-    const double middle = (low + high) / 2;
-    (middle / (1 + K * middle * middle) < ru ? low : high) = middle;
-  }
-  return (low + high) / 2;
-}
-
-Vector2d pixel_of(const CameraModel& camera, const Division& lens, const Vector3d& p) {
-  const Vector2d u = p.head<2>() / p.z();
-  const double ru = u.norm();
-  const Vector2d d = ru > 0 ? Vector2d(u * (distorted_radius(lens.K, ru) / ru)) : u;
-  return {camera.cx_px + camera.fx_px * d.x(), camera.cy_px + camera.fy_px * d.y()};
-}
-
-Vector2d pixel_of(const CameraModel& camera, const BrownConrady& lens, const Vector3d& p) {
-  const cv::Matx33d A(camera.fx_px, 0, camera.cx_px, 0, camera.fy_px, camera.cy_px, 0, 0, 1);
-  const std::vector<double> k{lens.k1, lens.k2, lens.p1, lens.p2, lens.k3};
-  const std::vector<cv::Point3d> points{{p.x(), p.y(), p.z()}};
-  std::vector<cv::Point2d> pixels;
-  cv::projectPoints(points, cv::Vec3d(0, 0, 0), cv::Vec3d(0, 0, 0), A, k, pixels);
-  return {pixels.front().x, pixels.front().y};
-}
-
-}  // namespace
-
 Vector2d independent_pixel(const CameraModel& camera, const Vector3d& p_CQ_mm) {
-  return std::visit([&](const auto& lens) { return pixel_of(camera, lens, p_CQ_mm); }, camera.distortion);
+  return photograph(camera, Pose::Identity(), p_CQ_mm);
 }
 
 CameraModel camera_with(const Distortion& lens) { return {1280, 1024, 1503.2, 1498.7, 645.3, 498.1, lens}; }

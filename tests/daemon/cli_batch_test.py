@@ -5,24 +5,13 @@ import json
 import math
 import pathlib
 import re
-import subprocess
 import sys
-import tempfile
 import unittest
 
-PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
+from program import Case, run, run_json
+
+SOURCE = pathlib.Path(sys.argv[2])
 CELL = SOURCE / "config/cells/car-body.json"
-
-
-def run(*arguments, stdin=""):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], input=stdin, capture_output=True, text=True, timeout=60)
-    return done.returncode, done.stdout, done.stderr
-
-
-def run_json(*arguments, stdin=""):
-    status, out, err = run(*arguments, "--json", stdin=stdin)
-    assert out.count("\n") == 1 and out.endswith("\n"), f"one line of JSON expected: {out!r} {err!r}"
-    return status, json.loads(out), err
 
 
 def product(A, B):
@@ -60,29 +49,6 @@ def project(camera, p_W):
 
 def without_comments(text):
     return re.sub(r"^\s*//.*$", "", text, flags=re.M)
-
-
-class Case(unittest.TestCase):
-    def setUp(self):
-        self.directory = tempfile.TemporaryDirectory()
-        self.addCleanup(self.directory.cleanup)
-
-    def write(self, name, text):
-        path = pathlib.Path(self.directory.name) / name
-        path.write_text(text)
-        return path
-
-    def expect_refused(self, answer, *fragments):
-        """Wrong usage or unreadable input: status 2, nothing but messages on stderr."""
-        status, out, err = answer
-        self.assertEqual((status, out), (2, ""), err)
-        for fragment in fragments:
-            self.assertIn(fragment, err)
-
-    def expect_near(self, found, wanted, tolerance):
-        self.assertEqual(len(found), len(wanted))
-        for f, w in zip(found, wanted):
-            self.assertAlmostEqual(f, w, delta=tolerance)
 
 
 class CheckConfig(Case):

@@ -1,28 +1,18 @@
 #!/usr/bin/env python3
-"""zeropose calibrate points, calibrate views, calibrate vanishing and convert camera through the real program: cameras made here from
-the formulas of spec 20, published measurements, wrong inputs. Usage: cli_calibrate_test.py ZEROPOSE SOURCE_DIR"""
+"""zeropose calibrate points, calibrate views, calibrate vanishing and convert camera through the real program: cameras
+made here from the formulas of spec 20, published measurements, wrong inputs.
+Usage: cli_calibrate_test.py ZEROPOSE SOURCE_DIR"""
 import json
 import math
 import pathlib
 import random
-import subprocess
 import sys
-import tempfile
 import unittest
 import xml.dom.minidom
 
-PROGRAM, SOURCE = sys.argv[1], pathlib.Path(sys.argv[2])
+from program import Case, run, run_json
 
-
-def run(*arguments, stdin=""):
-    done = subprocess.run([PROGRAM, *map(str, arguments)], input=stdin, capture_output=True, text=True, timeout=120)
-    return done.returncode, done.stdout, done.stderr
-
-
-def run_json(*arguments, stdin=""):
-    status, out, err = run(*arguments, "--json", stdin=stdin)
-    assert out.count("\n") == 1 and out.endswith("\n"), f"one line of JSON expected: {out!r} {err!r}"
-    return status, json.loads(out), err
+SOURCE = pathlib.Path(sys.argv[2])
 
 
 def rotation(six):
@@ -52,25 +42,6 @@ def pixel(camera, p_C):
 
 CAMERA = {"model": "division", "width": 768, "height": 572, "fx": 1930.0, "fy": 1925.0, "cx": 395.0, "cy": 279.0,
           "K": -0.2, "X_WC": [150.0, -220.0, 900.0, 172.0, 8.0, 15.0]}
-
-
-class Case(unittest.TestCase):
-    def setUp(self):
-        self.directory = tempfile.TemporaryDirectory()
-        self.addCleanup(self.directory.cleanup)
-
-    def path(self, name):
-        return pathlib.Path(self.directory.name) / name
-
-    def write(self, name, text):
-        self.path(name).write_text(text)
-        return self.path(name)
-
-    def expect_refused(self, answer, *fragments):
-        status, out, err = answer
-        self.assertEqual((status, out), (2, ""), err)
-        for fragment in fragments:
-            self.assertIn(fragment, err)
 
 
 class Points(Case):

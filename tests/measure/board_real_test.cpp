@@ -5,32 +5,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "measure/board.h"
+#include "tests/support/shared_data.h"
 
 namespace zeropose {
 namespace {
 
 using Eigen::Vector2d;
 
-std::filesystem::path folder() {
-  const char* data = std::getenv("ZEROPOSE_DATA");
-  const std::filesystem::path root = data ? data : ZEROPOSE_SOURCE_DIR "/../shared/data";
-  return root / "real/dbat_camcal";
-}
-
 struct Known {
   Vector2d place_mm, u_px;
 };
 
-// Columns view, id, x_mm, y_mm, z_mm, u_px, v_px; its pixel origin is the corner of the first pixel.
-std::vector<Known> known_in_view(int view) {
-  std::ifstream file(folder() / "points.csv");
+// From points.csv: view, id, x_mm, y_mm, z_mm, u_px, v_px; its pixel origin is the corner of the first pixel.
+std::vector<Known> known_in_view(int view, const std::string& points_csv) {
+  std::ifstream file(points_csv);
   std::vector<Known> points;
   std::string line;
   std::getline(file, line);
@@ -57,10 +50,11 @@ class RealBoard : public testing::TestWithParam<int> {};
 // by 0.139 px rms per axis, at most 0.73 px. The sheet is irregular by a few mm.
 TEST_P(RealBoard, MarksAreWhereAnotherProgramFoundThem) {
   const int view = GetParam();
-  const auto file = folder() / ("images/P82500" + std::to_string(20 + view) + ".JPG");
-  if (!std::filesystem::exists(file)) GTEST_SKIP() << "skipped: data not found";
-  const cv::Mat grey = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-  const std::vector<Known> points = known_in_view(view);
+  const auto file = test::shared_data("real/dbat_camcal/images/P82500" + std::to_string(20 + view) + ".JPG");
+  const auto table = test::shared_data("real/dbat_camcal/points.csv");
+  if (!file || !table) GTEST_SKIP() << test::data_not_found;
+  const cv::Mat grey = cv::imread(*file, cv::IMREAD_GRAYSCALE);
+  const std::vector<Known> points = known_in_view(view, *table);
   ASSERT_FALSE(grey.empty() || points.empty());
   BoardProblem problem;
   problem.rows = problem.cols = 10;

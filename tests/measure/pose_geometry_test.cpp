@@ -9,32 +9,15 @@
 namespace zeropose {
 namespace {
 
+using test::car_body_points;
 using test::CellScene;
+using test::estimate;
 using Random = test::Random;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-// The car body without knowledge of the discs, equal weights, no tolerances: plain geometry.
-CellScene points() {
-  CellScene scene = test::car_body();
-  scene.job.system_sigma_px = 0;
-  for (Mark& mark : scene.job.marks) {
-    mark.radius_mm = 0;
-    mark.weight = 1;
-    mark.tolerance_px = no_tolerance;
-  }
-  return scene;
-}
-
-PoseResult estimate(const CellScene& scene, std::span<const Observation> observations,
-                    std::optional<Pose> X_WO_start) {
-  PoseProblem problem = test::problem_of(scene.cameras, scene.job, observations, Pose::Identity());
-  problem.X_WO_start = X_WO_start;
-  return estimate_pose(problem);
-}
-
 TEST(PoseGeometry, RefusesTooFewMarks) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(13);
   auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.1, random);
   observations.resize(2);
@@ -53,7 +36,7 @@ TEST(PoseGeometry, RefusesTooFewMarks) {
 }
 
 TEST(PoseGeometry, RefusesMarksOnALine) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(14);
   for (std::size_t i = 0; i < 12; ++i)
     scene.job.marks[i].p_O_mm = Eigen::Vector3d(-400 + 280.0 * static_cast<double>(i), 0, 200);
@@ -70,7 +53,7 @@ TEST(PoseGeometry, RefusesMarksOnALine) {
 }
 
 TEST(PoseGeometry, RefusesOneMarkPerCameraSeenInParallel) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(15);
   // Four cameras look straight down at one mark each, on the optical axis: turning about z and moving in x
   // and y are seen, depth and tilt hardly.
@@ -95,7 +78,7 @@ TEST(PoseGeometry, RefusesOneMarkPerCameraSeenInParallel) {
 }
 
 TEST(PoseGeometry, RefusesToChooseBetweenSeveralPosesOfThreeMarks) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(16);
   scene.job.marks.resize(3);
   scene.job.views = {{0, 0}, {0, 1}, {0, 2}};
@@ -118,7 +101,7 @@ TEST(PoseGeometry, RefusesToChooseBetweenSeveralPosesOfThreeMarks) {
 // Numbers that cannot be used are answered, not asserted: production must go on.
 
 TEST(PoseInput, AnswersWithACodeToNumbersThatCannotBeUsed) {
-  const CellScene scene = points();
+  const CellScene scene = car_body_points();
   Random random(17);
   const auto good = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.1, random);
   const auto refuses = [&](const char* what, auto spoil) {
@@ -150,7 +133,7 @@ TEST(PoseInput, AnswersWithACodeToNumbersThatCannotBeUsed) {
 }
 
 TEST(PoseInput, SurvivesPixelsWithoutARay) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(18);
   auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.1, random);
   for (auto& observation : observations) observation.u_px.array() += 1e7;

@@ -11,27 +11,10 @@
 namespace zeropose {
 namespace {
 
+using test::car_body_points;
 using test::CellScene;
+using test::estimate;
 using Random = test::Random;
-
-// The car body without knowledge of the discs, equal weights, no tolerances: plain geometry.
-CellScene points() {
-  CellScene scene = test::car_body();
-  scene.job.system_sigma_px = 0;
-  for (Mark& mark : scene.job.marks) {
-    mark.radius_mm = 0;
-    mark.weight = 1;
-    mark.tolerance_px = no_tolerance;
-  }
-  return scene;
-}
-
-PoseResult estimate(const CellScene& scene, std::span<const Observation> observations,
-                    std::optional<Pose> X_WO_start) {
-  PoseProblem problem = test::problem_of(scene.cameras, scene.job, observations, Pose::Identity());
-  problem.X_WO_start = X_WO_start;
-  return estimate_pose(problem);
-}
 
 void use_brown(CellScene& scene) {
   for (auto& camera : scene.cameras) camera.model.distortion = BrownConrady{-0.2, 0.05, 0.001, -0.001, 0.01};
@@ -73,7 +56,7 @@ TEST(Pose, NeedsNoStart) {
 }
 
 TEST(Pose, NeedsNoStartWithOneCamera) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(3);
   scene.job.marks.resize(6);
   scene.job.views.clear();
@@ -96,7 +79,7 @@ TEST(Pose, JacobianAgreesWithFiniteDifferences) {
   Random random(4);
   for (const bool brown : {false, true})
     for (const Residual residual : {Residual::reprojection, Residual::algebraic}) {
-      CellScene scene = points();
+      CellScene scene = car_body_points();
       if (brown) use_brown(scene);
       const auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 3, random);
       PoseProblem problem = test::problem_of(scene.cameras, scene.job, observations, Pose::Identity());
@@ -153,7 +136,7 @@ Eigen::MatrixXd whitened_jacobian(const CellScene& scene, std::span<const Observ
 }
 
 TEST(Pose, CovarianceIsThatOfWeightsWhichAreNoInverseVariances) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(5);
   for (Mark& mark : scene.job.marks) mark.weight = test::uniform(random, 0.2, 1);
   auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0, random);
@@ -176,7 +159,7 @@ TEST(Pose, CovarianceIsThatOfWeightsWhichAreNoInverseVariances) {
 }
 
 TEST(Pose, ErrorsAreAsLargeAsTheCovarianceSays) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(6);
   for (Mark& mark : scene.job.marks) mark.weight = test::uniform(random, 0.3, 1);
   constexpr int trials = 500;
@@ -200,7 +183,7 @@ TEST(Pose, ErrorsAreAsLargeAsTheCovarianceSays) {
 }
 
 TEST(Pose, TotalCovarianceContainsSystemAndMarks) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(7);
   const auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.1, random);
   const Matrix6 plain = estimate(scene, observations, Pose::Identity()).total_covariance;
@@ -214,7 +197,7 @@ TEST(Pose, TotalCovarianceContainsSystemAndMarks) {
 }
 
 TEST(Pose, MarksOfWeightZeroAreReportedButNotUsed) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(8);
   scene.job.marks[4].weight = 0;
   auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.01, random);
@@ -231,7 +214,7 @@ TEST(Pose, MarksOfWeightZeroAreReportedButNotUsed) {
 }
 
 TEST(Pose, DeviationsAreFoundMinusProjectedInPixelsAndAtTheMarksDistance) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(9);
   const auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.5, random);
   const PoseResult result = estimate(scene, observations, Pose::Identity());
@@ -276,7 +259,7 @@ TEST(Pose, ByAlgebraicResidualsIsExactAsWell) {
 }
 
 TEST(Pose, OfASheetHasThreeUnknownsAndNeedsTwoMarks) {
-  CellScene scene = points();
+  CellScene scene = car_body_points();
   Random random(12);
   const Pose X_WP = from_six_numbers({1000, 20, 200, 2, -3, 15});
   for (const std::size_t count : {2u, 3u, 12u})

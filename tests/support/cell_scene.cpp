@@ -125,6 +125,24 @@ PoseProblem problem_of(std::span<const CalibratedCamera> cameras, const Job& job
   return problem;
 }
 
+CellScene car_body_points() {
+  CellScene scene = car_body();
+  scene.job.system_sigma_px = 0;
+  for (Mark& mark : scene.job.marks) {
+    mark.radius_mm = 0;
+    mark.weight = 1;
+    mark.tolerance_px = no_tolerance;
+  }
+  return scene;
+}
+
+PoseResult estimate(const CellScene& scene, std::span<const Observation> observations,
+                    std::optional<Pose> X_WO_start) {
+  PoseProblem problem = problem_of(scene.cameras, scene.job, observations, Pose::Identity());
+  problem.X_WO_start = X_WO_start;
+  return estimate_pose(problem);
+}
+
 void ErrorStatistics::add(const Pose& X_O0O, const Pose& X_O0O_true) {
   const SixNumbers a = to_six_numbers(X_O0O), b = to_six_numbers(X_O0O_true);
   Vector6 error;

@@ -19,6 +19,9 @@ struct CellScene {
 // Cameras from tests/golden, job from config/cells/car-body.json.
 CellScene car_body();
 
+// The car body without knowledge of the discs, equal weights, no tolerances: plain geometry.
+CellScene car_body_points();
+
 // The pixels of all views of the job for the object at X_WO, as seen by the given cameras: centre of each
 // disc's image plus normal noise, with that noise as covariance. Marks without an image are left out.
 std::vector<Observation> observe(std::span<const CalibratedCamera> cameras, const Job& job, const Pose& X_WO,
@@ -30,6 +33,10 @@ Pose random_shift(Random& random, double mm, double deg);
 // The problem of one observed frame, from the given start.
 PoseProblem problem_of(std::span<const CalibratedCamera> cameras, const Job& job,
                        std::span<const Observation> observations, const Pose& X_WO_start);
+
+// estimate_pose() of such a problem; without a start from any pose.
+PoseResult estimate(const CellScene& scene, std::span<const Observation> observations,
+                    std::optional<Pose> X_WO_start);
 
 // Errors of relative poses, component by component: x y z in mm, rx ry rz in degrees.
 class ErrorStatistics {
