@@ -26,7 +26,7 @@ constexpr std::size_t linear_points = 6;
 // From the world to pixels, scaled so that its third row's rotation has length 1 and the mean depth is
 // positive. nullopt: the points have no depth.
 std::optional<Matrix34> scaled_projection(std::span<const CalibrationPoint> points, const Centred& body) {
-  std::vector<SeenPoint> seen;
+  std::vector<ImagedPoint> seen;
   for (std::size_t i = 0; i < points.size(); ++i) seen.push_back({body.p_mm[i], points[i].u_px});
   auto P = projection_matrix(seen);
   if (!P) return std::nullopt;

@@ -20,11 +20,11 @@ struct Normaliser {
   double scale = 0;
 
   template <typename Get>
-  Normaliser(std::span<const SeenPoint> pairs, const Get& get) {
+  Normaliser(std::span<const ImagedPoint> pairs, const Get& get) {
     const double count = static_cast<double>(pairs.size());
-    for (const SeenPoint& pair : pairs) mean += get(pair) / count;
+    for (const ImagedPoint& pair : pairs) mean += get(pair) / count;
     double distance = 0;
-    for (const SeenPoint& pair : pairs) distance += (get(pair) - mean).norm() / count;
+    for (const ImagedPoint& pair : pairs) distance += (get(pair) - mean).norm() / count;
     if (distance > 0) scale = 1 / distance;
   }
   Eigen::Matrix<double, size, 1> operator()(const Eigen::Matrix<double, size, 1>& p) const {
@@ -38,9 +38,9 @@ struct Normaliser {
   }
 };
 
-Vector2d plane_of(const SeenPoint& pair) { return pair.p_mm.head<2>(); }
-Vector2d pixel_of(const SeenPoint& pair) { return pair.u; }
-Vector3d space_of(const SeenPoint& pair) { return pair.p_mm; }
+Vector2d plane_of(const ImagedPoint& pair) { return pair.p_mm.head<2>(); }
+Vector2d pixel_of(const ImagedPoint& pair) { return pair.u; }
+Vector3d space_of(const ImagedPoint& pair) { return pair.p_mm; }
 
 // Sums over points x (homogeneous) seen at u: A^T A of the direct linear transform, whose rows are
 // (x 0 -ux x) and (0 x -uy x), in blocks.
@@ -76,12 +76,12 @@ std::optional<VectorXd> null_vector(const MatrixXd& lower) {
 
 }  // namespace
 
-std::optional<Matrix3d> homography(std::span<const SeenPoint> pairs) {
+std::optional<Matrix3d> homography(std::span<const ImagedPoint> pairs) {
   if (pairs.size() < 4) return std::nullopt;
   const Normaliser<2> from(pairs, plane_of), to(pairs, pixel_of);
   if (from.scale == 0 || to.scale == 0) return std::nullopt;
   Sums<3> sums;
-  for (const SeenPoint& pair : pairs) sums.add(from(plane_of(pair)).homogeneous(), to(pixel_of(pair)));
+  for (const ImagedPoint& pair : pairs) sums.add(from(plane_of(pair)).homogeneous(), to(pixel_of(pair)));
   const auto h = null_vector(sums.lower());
   if (!h) return std::nullopt;
   Matrix3d H;
@@ -94,11 +94,11 @@ std::optional<Matrix3d> homography(std::span<const SeenPoint> pairs) {
   return back * H * from.matrix();
 }
 
-std::optional<Pose> pose_of_plane(const Matrix3d& H, std::span<const SeenPoint> pairs) {
+std::optional<Pose> pose_of_plane(const Matrix3d& H, std::span<const ImagedPoint> pairs) {
   const double scale = 2 / (H.col(0).norm() + H.col(1).norm());
   const double sign = H.row(2).dot(plane_of(pairs.front()).homogeneous()) > 0 ? 1 : -1;
   const Matrix3d M = sign * scale * H;
-  for (const SeenPoint& pair : pairs)
+  for (const ImagedPoint& pair : pairs)
     if (!(M.row(2).dot(plane_of(pair).homogeneous()) > 0)) return std::nullopt;
   Matrix3d R;
   R << M.col(0), M.col(1), M.col(0).cross(M.col(1));
@@ -109,13 +109,13 @@ std::optional<Pose> pose_of_plane(const Matrix3d& H, std::span<const SeenPoint> 
   return X_CB;
 }
 
-std::optional<Matrix34> projection_matrix(std::span<const SeenPoint> pairs) {
+std::optional<Matrix34> projection_matrix(std::span<const ImagedPoint> pairs) {
   if (pairs.size() < 6) return std::nullopt;
   const Normaliser<3> from(pairs, space_of);
   const Normaliser<2> to(pairs, pixel_of);
   if (from.scale == 0 || to.scale == 0) return std::nullopt;
   Sums<4> sums;
-  for (const SeenPoint& pair : pairs) sums.add(from(space_of(pair)).homogeneous(), to(pixel_of(pair)));
+  for (const ImagedPoint& pair : pairs) sums.add(from(space_of(pair)).homogeneous(), to(pixel_of(pair)));
   const auto h = null_vector(sums.lower());
   if (!h) return std::nullopt;
   Matrix34 P;
@@ -126,9 +126,9 @@ std::optional<Matrix34> projection_matrix(std::span<const SeenPoint> pairs) {
   return back * P * from.matrix();
 }
 
-std::optional<Pose> pose_of_projection(const Matrix34& P, std::span<const SeenPoint> pairs) {
+std::optional<Pose> pose_of_projection(const Matrix34& P, std::span<const ImagedPoint> pairs) {
   const double sign = P.row(2).dot(pairs.front().p_mm.homogeneous()) > 0 ? 1 : -1;
-  for (const SeenPoint& pair : pairs)
+  for (const ImagedPoint& pair : pairs)
     if (!(sign * P.row(2).dot(pair.p_mm.homogeneous()) > 0)) return std::nullopt;
   const Matrix3d M = sign * P.leftCols<3>();
   const double volume = M.determinant();

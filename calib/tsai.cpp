@@ -176,7 +176,7 @@ double tilt_deg(const Matrix2d& B) {
 // How much the depth of the plane's points changes across them, relative: from the homography, which needs
 // neither origin nor focal length. Infinite where there is no homography: then something else is wrong.
 double depth_change(const Pairs& pairs) {
-  std::vector<SeenPoint> seen;
+  std::vector<ImagedPoint> seen;
   for (std::size_t i = 0; i < pairs.p_mm.size(); ++i) seen.push_back({pairs.p_mm[i], pairs.x_px[i]});
   const auto H = homography(seen);
   if (!H) return std::numeric_limits<double>::infinity();

@@ -22,13 +22,13 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 struct Group {
   std::vector<Chunk> chunks;
   bool known = false;
-  std::vector<SeenPoint> pairs;  // px
+  std::vector<ImagedPoint> pairs;  // px
   BestPlane plane;               // X_GP
 };
 
 std::vector<Vector3d> points_of(const Group& group) {
   std::vector<Vector3d> points;
-  for (const SeenPoint& pair : group.pairs) points.push_back(pair.p_mm);
+  for (const ImagedPoint& pair : group.pairs) points.push_back(pair.p_mm);
   return points;
 }
 
@@ -52,10 +52,10 @@ std::vector<Group> groups_of(const ViewsProblem& problem, std::span<const Chunk>
   return groups;
 }
 
-std::vector<SeenPoint> in_plane(const Group& group) {
-  std::vector<SeenPoint> pairs = group.pairs;
+std::vector<ImagedPoint> in_plane(const Group& group) {
+  std::vector<ImagedPoint> pairs = group.pairs;
   const Pose X_PG = group.plane.X_GP.inverse();
-  for (SeenPoint& pair : pairs) pair.p_mm = X_PG * pair.p_mm;
+  for (ImagedPoint& pair : pairs) pair.p_mm = X_PG * pair.p_mm;
   return pairs;
 }
 
@@ -65,8 +65,8 @@ std::vector<double> focal_lengths(const CameraModel& model, std::span<const Grou
   std::vector<double> found;
   const Vector2d origin(model.cx_px, model.cy_px);
   for (const Group& group : groups) {
-    std::vector<SeenPoint> pairs = in_plane(group);
-    for (SeenPoint& pair : pairs) pair.u -= origin;
+    std::vector<ImagedPoint> pairs = in_plane(group);
+    for (ImagedPoint& pair : pairs) pair.u -= origin;
     if (group.plane.flatness() <= flat) {
       if (const auto H = homography(pairs)) planes.push_back(*H);
     } else if (const auto P = projection_matrix(pairs)) {
@@ -85,8 +85,8 @@ std::vector<double> focal_lengths(const CameraModel& model, std::span<const Grou
 
 // X_CG that fits best: from the plane, and from depth where there is some.
 std::optional<Pose> pose_of_group(const CameraModel& model, const Group& group) {
-  std::vector<SeenPoint> rays;
-  for (const SeenPoint& pair : in_plane(group))
+  std::vector<ImagedPoint> rays;
+  for (const ImagedPoint& pair : in_plane(group))
     if (const auto direction = ray(model, pair.u)) rays.push_back({pair.p_mm, direction->head<2>()});
   std::optional<Pose> best;
   double least = infinite;
@@ -94,7 +94,7 @@ std::optional<Pose> pose_of_group(const CameraModel& model, const Group& group) 
     if (!X_CP) return;
     const Pose X_CG = *X_CP * group.plane.X_GP.inverse();
     double sum = 0;
-    for (const SeenPoint& pair : group.pairs) {
+    for (const ImagedPoint& pair : group.pairs) {
       const auto u = project(model, X_CG * pair.p_mm);
       sum += u ? (*u - pair.u).squaredNorm() : infinite;
     }

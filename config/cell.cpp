@@ -84,7 +84,7 @@ NamedMark read_mark(JsonObject& object) {
   std::size_t kind = 0;
   object.read("name", mark.name);
   object.read("cameras", named.cameras);
-  if (object.read_word("kind", mark_kind_names, kind)) mark.kind = static_cast<MarkKind>(kind);
+  if (object.read_word("kind", mark_kind_names, kind)) mark.bright = kind == 1;
   object.read("position_mm", mark.p_O_mm, largest_mm);
   read_normal(object, mark.normal_O);
   object.read_optional("radius_mm", mark.radius_mm, NumberRange{0, 1000, true});

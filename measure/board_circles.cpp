@@ -37,7 +37,7 @@ struct Discs {
 
 MarkSearch search_of(const ImageView& image, const BoardProblem& problem, bool dark) {
   MarkSearch search;
-  search.kind = dark ? MarkKind::dark_disc : MarkKind::bright_disc;
+  search.bright = !dark;
   search.expected_px = search.half_window_px = 0.5 * Vector2d(image.width_px - 1, image.height_px - 1);
   search.min_diameter_px = problem.min_diameter_px;
   const double diagonal = std::hypot(image.width_px, image.height_px);

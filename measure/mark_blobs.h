@@ -10,15 +10,6 @@
 
 namespace zeropose {
 
-// Columns u0..u1 and rows v0..v1 of an image, inclusive; empty when u1 < u0 or v1 < v0.
-struct PixelWindow {
-  int u0 = 0, v0 = 0, u1 = -1, v1 = -1;
-
-  bool empty() const { return u1 < u0 || v1 < v0; }
-  int width() const { return u1 - u0 + 1; }
-  int height() const { return v1 - v0 + 1; }
-};
-
 // A region that may be a mark.
 struct Blob {
   PixelWindow box;

@@ -128,7 +128,7 @@ void CandidateFinder::look_at_level(const ImageView& image, const PixelWindow& w
   };
   const double largest = search.max_diameter_px + size_margin_px;
   const BlobLimits limits{std::max(4.0, 0.4 * search.min_diameter_px), largest};
-  for (const Blob& blob : blobs_.find(image, window, level, search.kind == MarkKind::bright_disc, limits)) {
+  for (const Blob& blob : blobs_.find(image, window, level, search.bright, limits)) {
     const double longest = std::max(blob.box.width(), blob.box.height());
     const double box_area = double(blob.box.width()) * blob.box.height();
     if (blob.touches_window) {
@@ -166,7 +166,7 @@ void CandidateFinder::add(const Sighting& sighting) {
 
 CandidateSearch CandidateFinder::judge(const ImageView& image, const MarkSearch& search) {
   CandidateSearch result{{}, reason_, 0};
-  const double sign = search.kind == MarkKind::bright_disc ? -1 : 1;
+  const double sign = search.bright ? -1 : 1;
   for (Group& group : groups_) {
     std::sort(group.begin(), group.end(),
               [](const Sighting& a, const Sighting& b) { return a.level < b.level; });

@@ -65,7 +65,7 @@ MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const Ell
   if (fit.saturated_share > saturated_share) {
     finding.status = MarkStatus::saturated;
   } else if (!explains(fit, finding, start, model_share) ||
-             bright != (search.kind == MarkKind::bright_disc)) {
+             bright != search.bright) {
     finding.status = MarkStatus::not_converged;
   } else if (finding.contrast < search.min_contrast) {
     finding.status = MarkStatus::low_contrast;

@@ -22,14 +22,6 @@ bool makes_sense(const ImageView& image, const MarkSearch& s) {
 
 int pixel_of(double place, int size) { return static_cast<int>(std::clamp(place, -1.0, double(size))); }
 
-PixelWindow window_of(const ImageView& image, const MarkSearch& s) {
-  const Eigen::Vector2d low = s.expected_px - s.half_window_px, high = s.expected_px + s.half_window_px;
-  return {std::max(0, pixel_of(std::ceil(low.x()), image.width_px)),
-          std::max(0, pixel_of(std::ceil(low.y()), image.height_px)),
-          std::min(image.width_px - 1, pixel_of(std::floor(high.x()), image.width_px)),
-          std::min(image.height_px - 1, pixel_of(std::floor(high.y()), image.height_px))};
-}
-
 // How near to a found mark a failed one came.
 int telling(MarkStatus status) {
   switch (status) {
@@ -111,6 +103,14 @@ MarkFinding find_mark(const ImageView& image, const MarkSearch& search, Workspac
 
 }  // namespace
 
+PixelWindow window_of(const ImageView& image, const MarkSearch& s) {
+  const Eigen::Vector2d low = s.expected_px - s.half_window_px, high = s.expected_px + s.half_window_px;
+  return {std::max(0, pixel_of(std::ceil(low.x()), image.width_px)),
+          std::max(0, pixel_of(std::ceil(low.y()), image.height_px)),
+          std::min(image.width_px - 1, pixel_of(std::floor(high.x()), image.width_px)),
+          std::min(image.height_px - 1, pixel_of(std::floor(high.y()), image.height_px))};
+}
+
 std::string_view name_of(MarkStatus status) {
   switch (status) {
     case MarkStatus::not_searched:
@@ -125,6 +125,8 @@ std::string_view name_of(MarkStatus status) {
       return "too_small";
     case MarkStatus::low_contrast:
       return "low_contrast";
+    case MarkStatus::blurred:
+      return "blurred";
     case MarkStatus::saturated:
       return "saturated";
     case MarkStatus::cut_off:

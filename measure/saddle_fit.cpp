@@ -41,7 +41,7 @@ std::vector<Pixel> pixels_round(const ImageView& image, const SaddleStart& start
     for (int u = u0; u <= u1; ++u) {
       const Vector2d off = Vector2d(u, v) - start.u_px;
       if ((inverse * off).cwiseAbs().maxCoeff() <= 1)
-        pixels.push_back({off.x(), off.y(), double(image.row(v)[u])});
+        pixels.push_back({off.x(), off.y(), image.grey_at(u, v)});
     }
   }
   return pixels;

@@ -78,11 +78,10 @@ Verdict check_image(const ImageView& image, const std::string& name) {
   constexpr int stride = 4;
   std::size_t pixels = 0, white = 0, bright = 0;
   for (int v = 0; v < image.height_px; v += stride) {
-    const std::uint8_t* row = image.row(v);
     for (int u = 0; u < image.width_px; u += stride) {
       ++pixels;
-      white += row[u] >= white_grey;
-      bright += row[u] > black_grey;
+      white += image.grey_at(u, v) >= white_grey;
+      bright += image.grey_at(u, v) > black_grey;
     }
   }
   const double count = static_cast<double>(std::max<std::size_t>(pixels, 1));

@@ -118,7 +118,7 @@ std::vector<Thing> cover_things(double radius_mm, double grey, Random& random) {
 }
 
 MarkPlate make_plate(const Mark& mark, const Stage& stage, Random& random) {
-  const bool dark = mark.kind == MarkKind::dark_disc;
+  const bool dark = !mark.bright;
   const double surface =
       random.uniform(0.93, 1.07) * (dark ? stage.picture.surface_grey : stage.picture.mark_grey);
   MarkPlate plate;

@@ -30,7 +30,7 @@ Window window_of(int seed, std::mt19937_64& random) {
   window.drawing.width_px = window.drawing.height_px = 220;
   window.drawing.background = 90 + 90 * unit(random);
   window.drawing.shading_per_px = 0.001 * Vector2d(unit(random) - 0.5, unit(random) - 0.5);
-  window.search.kind = seed % 3 == 0 ? MarkKind::bright_disc : MarkKind::dark_disc;
+  window.search.bright = seed % 3 == 0;
   window.search.expected_px = middle;
   window.search.half_window_px = {100, 100};
   window.search.min_diameter_px = smallest;
@@ -85,7 +85,7 @@ TEST(MarksInClutter, TheMarkIsFoundAmongIt) {
   for (int seed = 0; seed < windows; ++seed) {
     Window window = window_of(seed, random);
     const double diameter = 20 + 36 * unit(random), contrast = 30 + 60 * unit(random);
-    const double sign = window.search.kind == MarkKind::bright_disc ? 1 : -1;
+    const double sign = window.search.bright ? 1 : -1;
     const Vector2d truth = middle + Vector2d(unit(random) - 0.5, unit(random) - 0.5);
     const double grey = std::clamp(window.drawing.background + sign * contrast, 10.0, 235.0);
     add_clutter(window.drawing, smallest, largest, diameter / 2 + 4, random);

@@ -62,7 +62,7 @@ TEST(FindMarks, DarkAndBright) {
   EXPECT_EQ(find(dark, search).status, MarkStatus::found);
   EXPECT_LT((find(dark, search).u_px - truth).norm(), 0.03);  // 5 sigma
   EXPECT_EQ(find(bright, search).status, MarkStatus::no_candidate);
-  search.kind = MarkKind::bright_disc;
+  search.bright = true;
   EXPECT_EQ(find(bright, search).status, MarkStatus::found);
   EXPECT_LT((find(bright, search).u_px - truth).norm(), 0.04);
   EXPECT_EQ(find(dark, search).status, MarkStatus::no_candidate);
@@ -100,7 +100,7 @@ TEST(FindMarks, Saturated) {
   drawing.background = 100;
   drawing.figures = {ellipse(middle, 30, 1, 0, 300)};
   MarkSearch search = search_at(middle);
-  search.kind = MarkKind::bright_disc;
+  search.bright = true;
   EXPECT_EQ(find(picture_of(drawing), search).status, MarkStatus::saturated);
 }
 

@@ -18,7 +18,7 @@ Eigen::Vector3d vector_of(const json& numbers) {
 Mark mark_of(const json& entry) {
   Mark mark;
   mark.name = entry.at("name");
-  mark.kind = entry.at("kind") == "dark_disc" ? MarkKind::dark_disc : MarkKind::bright_disc;
+  mark.bright = entry.at("kind") == "bright_disc";
   mark.p_O_mm = vector_of(entry.at("position_mm"));
   mark.normal_O = vector_of(entry.at("normal")).normalized();
   mark.radius_mm = entry.at("radius_mm");
