@@ -87,7 +87,7 @@ class Look {
   const Sight& sight() const { return sight_; }
   // Half the step between the grey levels; false when that makes no sense.
   bool closer() {
-    const auto seen = finder_.finer(image_, window(), search_);
+    const auto seen = finder_.finer(image_, search_);
     if (seen) take(*seen);
     return seen.has_value();
   }

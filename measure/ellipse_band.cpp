@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <type_traits>
 
 namespace zeropose {
 namespace {
@@ -50,11 +51,13 @@ struct RingSums {
   std::int64_t n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0, g = 0, gx = 0, gy = 0, gg = 0;
 };
 
-void add_flat(const std::uint8_t* row, int from, int to, int origin_u, int y, RingSums& sums) {
+template <typename Pixel>
+void add_flat(const Pixel* row, int from, int to, int origin_u, int y, RingSums& sums) {
   if (to < from) return;
-  std::int64_t sg = 0, sgx = 0, sgg = 0;
+  using Sum = std::conditional_t<sizeof(Pixel) == 1, int, std::int64_t>;  // of one row
+  Sum sg = 0, sgx = 0, sgg = 0;
   for (int u = from; u <= to; ++u) {
-    const int g = row[u];
+    const Sum g = row[u];
     sg += g;
     sgx += g * (u - origin_u);
     sgg += g * g;
@@ -74,13 +77,14 @@ void add_flat(const std::uint8_t* row, int from, int to, int origin_u, int y, Ri
 }
 
 // Precondition: the band has room.
-void add_edge(const std::uint8_t* row, int from, int to, int y, EllipseBand& band) {
+template <typename Pixel>
+void add_edge(const Pixel* row, int from, int to, int y, int white, float scale, EllipseBand& band) {
   float *grey = &band.grey[band.count], *x = &band.x[band.count], *ys = &band.y[band.count];
   for (int u = from; u <= to; ++u) {
-    *grey++ = static_cast<float>(row[u]);
+    *grey++ = scale * static_cast<float>(row[u]);
     *x++ = static_cast<float>(u - band.origin_u);
     *ys++ = static_cast<float>(y);
-    band.saturated += row[u] == 255 ? 1 : 0;
+    band.saturated += row[u] >= white ? 1 : 0;
   }
   band.count += static_cast<std::size_t>(std::max(0, to - from + 1));
 }
@@ -92,12 +96,12 @@ void make_room(std::size_t row, EllipseBand& band) {
   for (auto* column : {&band.grey, &band.x, &band.y}) column->resize(2 * wanted);
 }
 
-FlatRing ring_of(const RingSums& s) {
+FlatRing ring_of(const RingSums& s, double scale) {
   FlatRing ring;
   const auto d = [](std::int64_t value) { return static_cast<double>(value); };
   ring.ee << d(s.n), d(s.x), d(s.y), d(s.x), d(s.xx), d(s.xy), d(s.y), d(s.xy), d(s.yy);
-  ring.ge << d(s.g), d(s.gx), d(s.gy);
-  ring.gg = d(s.gg);
+  ring.ge << scale * d(s.g), scale * d(s.gx), scale * d(s.gy);
+  ring.gg = scale * scale * d(s.gg);
   return ring;
 }
 
@@ -105,6 +109,46 @@ FlatRing ring_of(const RingSums& s) {
 constexpr std::array<std::size_t, bounds - 1> ring_of_class{2, 1, 0, 0, 3, 4};
 
 using Bounds = std::array<Bound, bounds>;
+
+// Calls take(from, to) for the columns of row v that are not hidden: as a whole, or one by one.
+template <typename Take>
+void visible_columns(const SectorOf& sector, OutlineSectors hidden, const Eigen::Vector2d& centre_px, int v,
+                     int from, int to, const Take& take) {
+  if (hidden == 0) return take(from, to);
+  for (int u = from; u <= to; ++u)
+    if ((hidden >> sector(u - centre_px.x(), v - centre_px.y()) & 1) == 0) take(u, u);
+}
+
+template <typename Pixel>
+void collect_rows(const ImageView& image, const Bounds& all, double reach_u, OutlineSectors hidden,
+                  EllipseBand& band) {
+  const Eigen::Vector2d centre = band.centre_px;
+  const SectorOf sector(band.shape_px2);
+  const auto scale = static_cast<float>(image.grey_per_count());
+  std::array<RingSums, EllipseBand::outer_rings + EllipseBand::inner_rings> sums;
+  const int first = std::max(0, static_cast<int>(std::ceil(centre.y() - all[0].reach_v)));
+  const int last = std::min(image.height_px - 1, static_cast<int>(std::floor(centre.y() + all[0].reach_v)));
+  for (int v = first; v <= last; ++v) {
+    const Pixel* row = image.row<Pixel>(v);
+    const int y = v - band.origin_v;
+    make_room(static_cast<std::size_t>(2 * (reach_u + band.half_width_px)) + 4, band);
+    Columns outside = columns_of(all[0], v - centre.y(), centre.x(), {0, image.width_px - 1});
+    for (std::size_t k = 0; k + 1 < bounds; ++k) {
+      const Columns inside = columns_of(all[k + 1], v - centre.y(), centre.x(), outside);
+      const auto take = [&](int from, int to) {
+        if (k == edge_class) {
+          add_edge(row, from, to, y, image.white, scale, band);
+        } else {
+          add_flat(row, from, to, band.origin_u, y, sums[ring_of_class[k]]);
+        }
+      };
+      visible_columns(sector, hidden, centre, v, outside.from, inside.from - 1, take);
+      visible_columns(sector, hidden, centre, v, inside.to + 1, outside.to, take);
+      outside = inside;
+    }
+  }
+  for (std::size_t k = 0; k < sums.size(); ++k) band.rings[k] = ring_of(sums[k], scale);
+}
 
 Bounds bounds_of(const HalfAxes& axes, double half_width) {
   Bounds all;
@@ -128,7 +172,7 @@ HalfAxes half_axes(const Eigen::Matrix2d& shape_px2) {
 }
 
 bool collect_band(const ImageView& image, const Eigen::Vector2d& centre_px, const Eigen::Matrix2d& shape_px2,
-                  double half_width_px, EllipseBand& band) {
+                  double half_width_px, OutlineSectors hidden, EllipseBand& band) {
   const HalfAxes axes = half_axes(shape_px2);
   const Bounds all = bounds_of(axes, half_width_px);
   const double reach_v = all[edge_class].reach_v;
@@ -144,28 +188,12 @@ bool collect_band(const ImageView& image, const Eigen::Vector2d& centre_px, cons
   band.origin_v = static_cast<int>(std::lround(centre_px.y()));
   band.count = 0;
   band.saturated = 0;
-  std::array<RingSums, EllipseBand::outer_rings + EllipseBand::inner_rings> sums;
-  const int first = std::max(0, static_cast<int>(std::ceil(centre_px.y() - all[0].reach_v)));
-  const int last =
-      std::min(image.height_px - 1, static_cast<int>(std::floor(centre_px.y() + all[0].reach_v)));
-  for (int v = first; v <= last; ++v) {
-    const std::uint8_t* row = image.row(v);
-    const int y = v - band.origin_v;
-    make_room(static_cast<std::size_t>(2 * (reach_u + half_width_px)) + 4, band);
-    Columns outside = columns_of(all[0], v - centre_px.y(), centre_px.x(), {0, image.width_px - 1});
-    for (std::size_t k = 0; k + 1 < bounds; ++k) {
-      const Columns inside = columns_of(all[k + 1], v - centre_px.y(), centre_px.x(), outside);
-      if (k == edge_class) {
-        add_edge(row, outside.from, inside.from - 1, y, band);
-        add_edge(row, inside.to + 1, outside.to, y, band);
-      } else {
-        add_flat(row, outside.from, inside.from - 1, band.origin_u, y, sums[ring_of_class[k]]);
-        add_flat(row, inside.to + 1, outside.to, band.origin_u, y, sums[ring_of_class[k]]);
-      }
-      outside = inside;
-    }
+  band.rounding_grey2 = image.grey_per_count() * image.grey_per_count() / 12;
+  if (image.two_bytes()) {
+    collect_rows<std::uint16_t>(image, all, reach_u, hidden, band);
+  } else {
+    collect_rows<std::uint8_t>(image, all, reach_u, hidden, band);
   }
-  for (std::size_t k = 0; k < sums.size(); ++k) band.rings[k] = ring_of(sums[k]);
   return true;
 }
 

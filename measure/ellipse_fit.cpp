@@ -14,8 +14,6 @@ namespace {
 
 using namespace ellipse_model;
 
-constexpr double rounding_variance = 1.0 / 12;
-
 State state_of(const EllipseStart& start, const EllipseBand& band, double blur_px) {
   State state;
   state.R2 = std::sqrt(start.shape_px2.determinant());
@@ -68,7 +66,7 @@ Taken flat_rings(const EllipseBand& band, const State& state) {
     if (taken[k]) quietest = std::min(quietest, variance[k]);
   }
   const double contrast = std::abs(state.at(background) - state.at(mark));
-  const double most = 2.5 * quietest + rounding_variance + 1e-4 * contrast * contrast;
+  const double most = 2.5 * quietest + band.rounding_grey2 + 1e-4 * contrast * contrast;
   const double room = 0.05 * contrast + 0.5 * std::sqrt(quietest) + 0.5;
   for (std::size_t k = 0; k < taken.size(); ++k) {
     const bool first = k == 0 || k == EllipseBand::outer_rings;
@@ -94,8 +92,8 @@ Unknowns step_from(const Normal& normal, double lambda) {
   return solver.solve(normal.g);
 }
 
-double variance_of(const Normal& normal) {
-  return std::max(normal.squares / std::max(1.0, normal.count - unknowns), rounding_variance);
+double variance_of(const Normal& normal, const EllipseBand& band) {
+  return std::max(normal.squares / std::max(1.0, normal.count - unknowns), band.rounding_grey2);
 }
 
 // Did the outline stay in the band that was collected for it?
@@ -170,7 +168,7 @@ Outcome Descent::run() {
     State next = state;
     const Unknowns step = step_from(normal, lambda);
     next.at += step;
-    const double sigmas = std::sqrt(std::max(0.0, step.dot(normal.N * step)) / variance_of(normal));
+    const double sigmas = std::sqrt(std::max(0.0, step.dot(normal.N * step)) / variance_of(normal, band));
     if (next.plausible() && sigmas < 6 && !rings_chosen) {
       if (!choose_rings(next)) {
         state = next;
@@ -204,7 +202,7 @@ void judge_outline(const Descent& d, EllipseFit& fit) {
     Normal unused;
     evaluate_edge(d.band, d.state, Wanted::gradient, unused, sectors);
   }
-  const double noise2 = fit.flat_rms > 0 ? fit.flat_rms * fit.flat_rms : rounding_variance;
+  const double noise2 = fit.flat_rms > 0 ? fit.flat_rms * fit.flat_rms : d.band.rounding_grey2;
   double square = 0, noise_square = 0;
   for (std::size_t k = 0; k < Sectors::count; ++k) {
     if (!(sectors.ss[k] > 0)) continue;
@@ -221,13 +219,14 @@ EllipseFit report(const Descent& d) {
   EllipseFit fit;
   fit.iterations = d.iterations;
   const SmallCholesky<unknowns> solver(d.normal.N);
-  fit.covariance_px2 = variance_of(d.normal) * solver.inverse().topLeftCorner<2, 2>();
+  fit.covariance_px2 = variance_of(d.normal, band) * solver.inverse().topLeftCorner<2, 2>();
   fit.centre_px = d.state.at.head<2>() + Eigen::Vector2d(band.origin_u, band.origin_v);
   fit.shape_px2 = d.state.shape();
   const double light = 1 + d.state.at(gx) * d.state.at(cu) + d.state.at(gy) * d.state.at(cv);
   fit.mark_grey = d.state.at(mark) * light;
   fit.background_grey = d.state.at(background) * light;
   fit.blur_px = d.state.at(blur);
+  fit.shading_per_px = d.state.at.segment<2>(gx) / light;
   fit.flat_rms = rms_of_rings(band, d.taken, d.state);
   fit.edge_count = double(band.size());
   fit.flat_count = d.normal.count - fit.edge_count;
@@ -242,17 +241,20 @@ EllipseFit report(const Descent& d) {
 
 }  // namespace
 
-EllipseFit fit_ellipse(const ImageView& image, const EllipseStart& start, EllipseWorkspace& workspace) {
+EllipseFit fit_ellipse(const ImageView& image, const EllipseStart& start, EllipseWorkspace& workspace,
+                       const BlurShape& blur_shape) {
   EllipseBand& band = workspace.band;
   EllipseStart from = start;
-  double half_width_px = ellipse_band_px, blur_px = 0.8;
+  double half_width_px = start.band_px, blur_px = 0.8;
   for (int round = 0; round < 4; ++round) {
     if (!(from.shape_px2.determinant() > 0) ||
-        !collect_band(image, from.centre_px, from.shape_px2, half_width_px, band) ||
+        !collect_band(image, from.centre_px, from.shape_px2, half_width_px, from.hidden, band) ||
         band.size() < 4 * unknowns) {
       return {};
     }
     Descent descent{band, state_of(from, band, blur_px)};
+    descent.state.blur_c = blur_shape.c;
+    descent.state.blur_s = blur_shape.s;
     const Outcome outcome = descent.run();
     if (outcome == Outcome::done) return report(descent);
     if (outcome == Outcome::failed) return {};
@@ -262,7 +264,7 @@ EllipseFit fit_ellipse(const ImageView& image, const EllipseStart& start, Ellips
     from.mark_grey = state.at(mark);
     from.background_grey = state.at(background);
     blur_px = state.at(blur);
-    half_width_px = std::max(ellipse_band_px, 3.2 * blur_px);
+    half_width_px = std::max(start.band_px, 3.2 * blur_px);
   }
   return {};
 }

@@ -14,6 +14,14 @@ struct EllipseStart {
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d shape_px2 = Eigen::Matrix2d::Identity();
   double mark_grey = 0, background_grey = 0;
+  OutlineSectors hidden = 0;  // left out
+  double band_px = 2.5;       // to both sides of the outline, more where the edge is blurred more
+};
+
+// How the edge's blur depends on the direction across it: sigma / (1 + c cos 2a + s sin 2a). Motion makes it
+// so.
+struct BlurShape {
+  double c = 0, s = 0;
 };
 
 struct EllipseFit {
@@ -22,7 +30,8 @@ struct EllipseFit {
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
   Eigen::Matrix2d shape_px2 = Eigen::Matrix2d::Zero();
   double mark_grey = 0, background_grey = 0;
-  double blur_px = 0;                     // sigma of the edge
+  double blur_px = 0;                                        // sigma of the edge, mean over the directions
+  Eigen::Vector2d shading_per_px = Eigen::Vector2d::Zero();  // relative, about the centre
   double edge_rms = 0;                    // grey levels: residuals in the band across the outline
   double flat_rms = 0;                    // in the flat rings beside it that were taken; 0 if none was
   double edge_count = 0, flat_count = 0;  // pixels behind the two
@@ -39,11 +48,11 @@ struct EllipseWorkspace {
 
 // Model: (1 + g . x) (M + (B - M) Phi(d / s)), d the distance to the outline (first order, exact on it), with
 // ten unknowns: centre, shape (3), blur s, levels B and M, relative shading g (2). Pixels one by one within
-// ellipse_band_px of the outline (more where the edge is blurred more); beyond it up to two rings inside and
+// the band about the outline; beyond it up to two rings inside and
 // three outside are taken as flat if they are. Covariance: inverse information times the residual variance,
-// which is never taken below that of rounding. Not converged: no minimum with a plausible outline near the
-// start, or the band reaches beyond the image.
-inline constexpr double ellipse_band_px = 2.5;
-EllipseFit fit_ellipse(const ImageView& image, const EllipseStart& start, EllipseWorkspace& workspace);
+// which is never taken below that of rounding. The blur's shape is taken as it is. Not converged: no minimum
+// with a plausible outline near the start, or the band reaches beyond the image.
+EllipseFit fit_ellipse(const ImageView& image, const EllipseStart& start, EllipseWorkspace& workspace,
+                       const BlurShape& blur_shape = {});
 
 }  // namespace zeropose

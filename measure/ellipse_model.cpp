@@ -12,7 +12,7 @@ struct Bell {
 
 // Good to 1e-6 for the density and 1e-5 for the integral (Abramowitz and Stegun 26.2.17); free of branches,
 // so that the compiler turns the loop round it into vector code.
-inline Bell bell(float t) {
+[[gnu::always_inline]] inline Bell bell(float t) {
   const float size = std::min(std::abs(t), 5.0F);
   const float y = size * size * (-0.5F / 32);
   float e = 1 + y * (1 + y * (1.0F / 2) * (1 + y * (1.0F / 3) * (1 + y * (1.0F / 4) * (1 + y * (1.0F / 5)))));
@@ -44,22 +44,28 @@ struct Constants {
         step(float(state.at(background) - state.at(mark))),
         inverse_blur(float(1 / state.at(blur))),
         light_x(float(state.at(gx))),
-        light_y(float(state.at(gy))) {}
-  float u, v, r2, a, b, c, low, step, inverse_blur, light_x, light_y;
+        light_y(float(state.at(gy))),
+        blur_c(float(state.blur_c)),
+        blur_s(float(state.blur_s)) {}
+  float u, v, r2, a, b, c, low, step, inverse_blur, light_x, light_y, blur_c, blur_s;
 };
 
-void differentiate(const float* __restrict grey, const float* __restrict px, const float* __restrict py,
-                   const Constants k, Block& __restrict out) {
+[[gnu::always_inline]] inline void differentiate(const float* __restrict grey, const float* __restrict px,
+                                                 const float* __restrict py, const Constants k,
+                                                 Block& __restrict out) {
   for (std::size_t i = 0; i < block_size; ++i) {
     const float x = px[i] - k.u, y = py[i] - k.v;
     const float wx = k.a * x + k.b * y, wy = k.b * x + k.c * y;
     const float q = std::max(x * wx + y * wy, 1e-6F), rho = std::sqrt(q);
     const float im = 1 / std::sqrt(wx * wx + wy * wy + 1e-12F);
     const float d = (q - rho) * im;
-    const Bell edge = bell(d * k.inverse_blur);
+    const float along = 2 * im * im;
+    const float sharpness =
+        k.inverse_blur * (1 + k.blur_c * (along * wx * wx - 1) + k.blur_s * along * wx * wy);
+    const Bell edge = bell(d * sharpness);
     const float light = 1 + k.light_x * px[i] + k.light_y * py[i];
     const float level = k.low + k.step * edge.below;
-    const float slope = light * k.step * edge.density * k.inverse_blur;
+    const float slope = light * k.step * edge.density * sharpness;
     const float by_q = slope * im * (1 - 0.5F / rho), by_m = slope * d * im * im;
     out.row[cu][i] = by_m * (k.a * wx + k.b * wy) - 2 * by_q * wx;
     out.row[cv][i] = by_m * (k.b * wx + k.c * wy) - 2 * by_q * wy;
@@ -75,21 +81,22 @@ void differentiate(const float* __restrict grey, const float* __restrict px, con
   }
 }
 
-// Sums of products of pairs of rows, four partial sums each: the residual's pairs first.
+// Sums of products of pairs of rows, some partial sums each: the residual's pairs first.
 struct Products {
-  alignas(64) float sum[columns * (columns + 1) / 2][4] = {};
+  static constexpr std::size_t lanes = 8;
+  alignas(64) float sum[columns * (columns + 1) / 2][lanes] = {};
 };
 
-void add_products(const Block& __restrict block, Wanted wanted, Products& __restrict products) {
-  float(*__restrict sum)[4] = products.sum;
+[[gnu::always_inline]] inline void add_products(const Block& __restrict block, Wanted wanted,
+                                                Products& __restrict products) {
+  float(*__restrict sum)[Products::lanes] = products.sum;
   const std::size_t last = wanted == Wanted::gradient ? unknowns : 0;
   for (std::size_t i = columns; i-- > last;) {
     const float* __restrict a = block.row[i];
     for (std::size_t j = 0; j <= i; ++j, ++sum) {
       const float* __restrict b = block.row[j];
-      for (std::size_t l = 0; l < 4; ++l) {
-        (*sum)[l] += (a[l] * b[l] + a[l + 4] * b[l + 4]) + (a[l + 8] * b[l + 8] + a[l + 12] * b[l + 12]);
-      }
+      for (std::size_t l = 0; l < Products::lanes; ++l)
+        (*sum)[l] += a[l] * b[l] + a[l + Products::lanes] * b[l + Products::lanes];
     }
   }
 }
@@ -98,7 +105,8 @@ void add_products(const Block& __restrict block, Wanted wanted, Products& __rest
 void unpack(const Products& products, Wanted wanted, Normal& normal) {
   const auto total = [&products](Eigen::Index pair) {
     const float* sum = products.sum[pair];
-    return (double{sum[0]} + double{sum[1]}) + (double{sum[2]} + double{sum[3]});
+    return ((double{sum[0]} + double{sum[1]}) + (double{sum[2]} + double{sum[3]})) +
+           ((double{sum[4]} + double{sum[5]}) + (double{sum[6]} + double{sum[7]}));
   };
   Eigen::Index pair = 0;
   for (; pair < unknowns; ++pair) normal.g(pair) = total(pair);
@@ -109,8 +117,8 @@ void unpack(const Products& products, Wanted wanted, Normal& normal) {
   }
 }
 
-void add_sectors(const Block& block, const float* px, const float* py, const Constants& k, std::size_t n,
-                 Sectors& sectors) {
+[[gnu::always_inline]] inline void add_sectors(const Block& block, const float* px, const float* py,
+                                               const Constants& k, std::size_t n, Sectors& sectors) {
   for (std::size_t i = 0; i < n; ++i) {
     const float x = px[i] - k.u, y = py[i] - k.v, ax = std::abs(x), ay = std::abs(y);
     const std::size_t octant = (x < 0 ? 1U : 0U) + (y < 0 ? 2U : 0U) + (ax < ay ? 4U : 0U);
@@ -121,10 +129,8 @@ void add_sectors(const Block& block, const float* px, const float* py, const Con
   }
 }
 
-}  // namespace
-
-void evaluate_edge(const EllipseBand& band, const State& state, Wanted wanted, Normal& normal,
-                   Sectors& sectors, std::size_t stride) {
+[[gnu::always_inline]] inline void evaluate(const EllipseBand& band, const State& state, Wanted wanted,
+                                            Normal& normal, Sectors& sectors, std::size_t stride) {
   const Constants constants(state);
   Products products;
   Block block;
@@ -141,6 +147,24 @@ void evaluate_edge(const EllipseBand& band, const State& state, Wanted wanted, N
   }
   unpack(products, wanted, normal);
   normal.count = double(n);
+}
+
+#ifdef __x86_64__
+[[gnu::target("avx2,fma")]] void evaluate_wide(const EllipseBand& band, const State& state, Wanted wanted,
+                                               Normal& normal, Sectors& sectors, std::size_t stride) {
+  evaluate(band, state, wanted, normal, sectors, stride);
+}
+const bool has_wide = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#endif
+
+}  // namespace
+
+void evaluate_edge(const EllipseBand& band, const State& state, Wanted wanted, Normal& normal,
+                   Sectors& sectors, std::size_t stride) {
+#ifdef __x86_64__
+  if (has_wide) return evaluate_wide(band, state, wanted, normal, sectors, stride);
+#endif
+  evaluate(band, state, wanted, normal, sectors, stride);
 }
 
 }  // namespace zeropose::ellipse_model

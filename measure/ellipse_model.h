@@ -21,6 +21,7 @@ inline constexpr double smallest_blur_px = 0.25, largest_blur_px = 4;
 struct State {
   Unknowns at = Unknowns::Zero();
   double R2 = 1;
+  double blur_c = 0, blur_s = 0;  // shape of the blur (BlurShape); not estimated here
 
   Eigen::Matrix2d shape() const {
     Eigen::Matrix2d P;

@@ -18,7 +18,7 @@ inline constexpr double no_tolerance = std::numeric_limits<double>::infinity();
 struct Mark {
   std::string name;
   MarkKind kind = MarkKind::disc;
-  bool bright = false;  // brighter than what surrounds it
+  bool bright = false;                                 // brighter than what surrounds it
   Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();    // its centre
   Eigen::Vector3d normal_O = Eigen::Vector3d::Zero();  // of its plane, towards the camera; zero: unknown
   double radius_mm = 0;                                // 0: unknown; then no eccentricity correction

@@ -4,63 +4,90 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <numbers>
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 namespace zeropose {
 namespace {
 
-constexpr std::size_t lead = 8;  // zeros before the pixels of a row, and at least as many behind
-
-// Eight bytes, the first one lowest.
-std::uint64_t eight_at(const std::uint8_t* bytes) {
-  std::uint64_t eight = 0;
-  std::memcpy(&eight, bytes, 8);
-  if constexpr (std::endian::native == std::endian::big) eight = __builtin_bswap64(eight);
-  return eight;
+// Which of sixteen pixels are below the level (1..255), the first one in the lowest bit.
+std::uint64_t below(const std::uint8_t* greys, int level) {
+#ifdef __SSE2__
+  const __m128i pixels = _mm_loadu_si128(reinterpret_cast<const __m128i*>(greys));
+  const __m128i highest = _mm_set1_epi8(static_cast<char>(level - 1));
+  return static_cast<std::uint64_t>(_mm_movemask_epi8(_mm_cmpeq_epi8(_mm_min_epu8(pixels, highest), pixels)));
+#else
+  std::uint64_t bits = 0;
+  for (int i = 0; i < 16; ++i) bits |= std::uint64_t{greys[i] < level} << i;
+  return bits;
+#endif
 }
 
 }  // namespace
 
-const std::vector<Blob>& BlobFinder::find(const ImageView& image, const PixelWindow& window, int level,
-                                          bool bright, const BlobLimits& limits) {
+const std::vector<Blob>& BlobFinder::find(const SearchImage& image, int level, bool bright,
+                                          const BlobLimits& limits) {
   blobs_.clear();
-  if (window.empty() || !cut_into_runs(image, window, level, bright)) return blobs_;
+  if (image.empty() || !cut_into_runs(image, std::clamp(level, 1, 255), bright)) return blobs_;
   join_runs();
-  select(window, limits);
+  select(image, limits);
   measure_moments();
   measure_misfit();
   return blobs_;
 }
 
-bool BlobFinder::cut_into_runs(const ImageView& image, const PixelWindow& window, int level, bool bright) {
-  const auto width = static_cast<std::size_t>(window.width());
-  row_.assign(lead + (width + 8) / 8 * 8 + 8, 0);
+// Tiles that lie on one side of the level as a whole need no look at their pixels.
+bool BlobFinder::cut_into_runs(const SearchImage& image, int level, bool bright) {
+  const int tiles_per_word = 64 / SearchImage::tile_width;
   runs_.clear();
   row_starts_.clear();
-  most_runs_ = 200 + width * static_cast<std::size_t>(window.height()) / 24;
-  const auto threshold = static_cast<std::uint8_t>(std::clamp(level, 0, 255));
-  const std::uint8_t flip = bright ? 1 : 0;
-  for (int v = window.v0; v <= window.v1; ++v) {
-    const std::uint8_t* pixels = image.row(v) + window.u0;
-    std::uint8_t* __restrict out = row_.data() + lead;
-    for (std::size_t i = 0; i < width; ++i) {
-      out[i] = static_cast<std::uint8_t>((pixels[i] < threshold ? 1 : 0) ^ flip);
-    }
+  most_runs_ = 200 + static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height()) / 24;
+  const std::uint64_t flip = bright ? 0xFFFF : 0;
+  for (int v = 0; v < image.height(); ++v) {
+    if (v % SearchImage::tile_height == 0) sort_tiles(image, v / SearchImage::tile_height, level, bright);
+    bits_ = uniform_;
+    const std::uint8_t* greys = image.row(v);
+    for (const int tile : mixed_)
+      bits_[std::size_t(tile / tiles_per_word)] |=
+          (below(greys + tile * SearchImage::tile_width, level) ^ flip)
+          << (tile % tiles_per_word * SearchImage::tile_width);
     row_starts_.push_back(runs_.size());
-    if (!runs_of_row(v, window.u0, width)) return false;
+    runs_of_row(v, image.width());
+    if (runs_.size() > most_runs_) return false;
   }
   row_starts_.push_back(runs_.size());
   return true;
 }
 
-// Runs start and end where a byte differs from the one before; the zeros round the row close the outer ones.
-bool BlobFinder::runs_of_row(int v, int u0, std::size_t width) {
+void BlobFinder::sort_tiles(const SearchImage& image, int tile_row, int level, bool bright) {
+  const int tiles_per_word = 64 / SearchImage::tile_width;
+  uniform_.assign(std::size_t((image.tile_columns() + tiles_per_word - 1) / tiles_per_word), 0);
+  mixed_.clear();
+  const SearchImage::TileRange* tiles = image.tiles(tile_row);
+  for (int tile = 0; tile < image.tile_columns(); ++tile) {
+    const bool all_below = tiles[tile].high < level, none_below = tiles[tile].low >= level;
+    if (!all_below && !none_below) {
+      mixed_.push_back(tile);
+    } else if (all_below != bright) {
+      uniform_[std::size_t(tile / tiles_per_word)] |= std::uint64_t{0xFFFF}
+                                                      << (tile % tiles_per_word * SearchImage::tile_width);
+    }
+  }
+}
+
+// Runs start and end where a bit differs from the one before.
+void BlobFinder::runs_of_row(int v, int width) {
   int start = -1;
-  for (std::size_t i = lead; i <= lead + width; i += 8) {
-    std::uint64_t turns = eight_at(&row_[i]) ^ eight_at(&row_[i - 1]);
+  std::uint64_t before = 0;
+  for (std::size_t word = 0; word < bits_.size(); ++word) {
+    std::uint64_t turns = bits_[word] ^ (bits_[word] << 1 | before);
+    before = bits_[word] >> 63;
     for (; turns != 0; turns &= turns - 1) {
-      const int at = u0 + static_cast<int>(i - lead) + std::countr_zero(turns) / 8;
+      const int at = static_cast<int>(64 * word) + std::countr_zero(turns);
+      if (at >= width) break;
       if (start < 0) {
         start = at;
       } else {
@@ -69,7 +96,7 @@ bool BlobFinder::runs_of_row(int v, int u0, std::size_t width) {
       }
     }
   }
-  return runs_.size() <= most_runs_;
+  if (start >= 0) runs_.push_back({start, width - 1, v, -1});
 }
 
 int BlobFinder::root_of(int region) {
@@ -106,7 +133,7 @@ void BlobFinder::join_runs() {
   }
 }
 
-void BlobFinder::select(const PixelWindow& window, const BlobLimits& limits) {
+void BlobFinder::select(const SearchImage& image, const BlobLimits& limits) {
   for (Run& run : runs_) {
     run.region = root_of(run.region);
     Region& region = regions_[std::size_t(run.region)];
@@ -123,8 +150,8 @@ void BlobFinder::select(const PixelWindow& window, const BlobLimits& limits) {
     Blob blob;
     blob.box = region.box;
     blob.area = region.area;
-    blob.touches_window = region.box.u0 == window.u0 || region.box.v0 == window.v0 ||
-                          region.box.u1 == window.u1 || region.box.v1 == window.v1;
+    blob.touches_window = region.box.u0 == 0 || region.box.v0 == 0 || region.box.u1 == image.width() - 1 ||
+                          region.box.v1 == image.height() - 1;
     region.blob = static_cast<int>(blobs_.size());
     blobs_.push_back(blob);
   }

@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "measure/image.h"
+#include "measure/search_image.h"
 
 namespace zeropose {
 
-// A region that may be a mark.
+// A region that may be a mark, in pixels of the search image.
 struct Blob {
   PixelWindow box;
   bool touches_window = false;  // then only box and area are given
@@ -30,8 +31,7 @@ class BlobFinder {
   // Regions (4-connected) of pixels below the level (or, for bright ones, at or above it) whose box is within
   // the limits, in the order of their first row. A level that falls apart into very many runs (noise about
   // the level) gives none.
-  const std::vector<Blob>& find(const ImageView& image, const PixelWindow& window, int level, bool bright,
-                                const BlobLimits& limits);
+  const std::vector<Blob>& find(const SearchImage& image, int level, bool bright, const BlobLimits& limits);
 
  private:
   struct Run {
@@ -48,15 +48,17 @@ class BlobFinder {
     double n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0, overlap = 0;
   };
 
-  bool cut_into_runs(const ImageView& image, const PixelWindow& window, int level, bool bright);
-  bool runs_of_row(int v, int u0, std::size_t width);
+  bool cut_into_runs(const SearchImage& image, int level, bool bright);
+  void sort_tiles(const SearchImage& image, int tile_row, int level, bool bright);
+  void runs_of_row(int v, int width);
   void join_runs();
   int root_of(int region);
-  void select(const PixelWindow& window, const BlobLimits& limits);
+  void select(const SearchImage& image, const BlobLimits& limits);
   void measure_moments();
   void measure_misfit();
 
-  std::vector<std::uint8_t> row_;
+  std::vector<std::uint64_t> uniform_, bits_;  // one bit per pixel of a row: in the region or not
+  std::vector<int> mixed_;                     // tiles that the level crosses
   std::vector<Run> runs_;
   std::vector<std::size_t> row_starts_;
   std::vector<Region> regions_;

@@ -12,19 +12,28 @@ namespace {
 constexpr double coarsest_step = 24, finest_step = 3;  // grey levels
 constexpr double size_margin_px = 2;                   // the region at one level against the fitted outline
 
+constexpr double flatten_share = 0.5;  // of the least contrast: what the light may fall off over a mark
+
+// As coarse as the smallest mark allows: ten pixels across are enough to know it.
+int reduction_for(const MarkSearch& search) {
+  int reduction = 1;
+  while (reduction < 8 && search.min_diameter_px >= 20 * reduction) reduction *= 2;
+  return reduction;
+}
+
 struct GreyRange {
   int low = 0, high = 0;
 };
 
 // Between the grey levels that fewer pixels than a small mark has lie below, or above.
-GreyRange range_of(const ImageView& image, const PixelWindow& window, const MarkSearch& search) {
+GreyRange range_of(const SearchImage& image, const MarkSearch& search) {
   std::array<int, 256> histogram{};
-  const double mark =
-      0.25 * std::numbers::pi * search.min_diameter_px * search.min_diameter_px * search.min_axis_ratio;
-  const int stride = mark > 400 ? 3 : mark > 100 ? 2 : 1;
-  for (int v = window.v0; v <= window.v1; v += stride) {
+  const double diameter = search.min_diameter_px / image.reduction();
+  const double mark = 0.25 * std::numbers::pi * diameter * diameter * search.min_axis_ratio;
+  const int stride = mark > 400 ? 3 : mark > 20 ? 2 : 1;
+  for (int v = 0; v < image.height(); v += stride) {
     const std::uint8_t* row = image.row(v);
-    for (int u = window.u0; u <= window.u1; u += stride) ++histogram[row[u]];
+    for (int u = 0; u < image.width(); u += stride) ++histogram[row[u]];
   }
   const int few = std::max(1, static_cast<int>(0.25 * mark / (stride * stride)));
   GreyRange range{0, 255};
@@ -38,8 +47,8 @@ double sample(const ImageView& image, const Eigen::Vector2d& at) {
   const double v = std::clamp(at.y(), 0.0, image.height_px - 1.001);
   const int iu = static_cast<int>(u), iv = static_cast<int>(v);
   const double fu = u - iu, fv = v - iv;
-  const std::uint8_t *a = image.row(iv) + iu, *b = image.row(iv + 1) + iu;
-  return (1 - fv) * ((1 - fu) * a[0] + fu * a[1]) + fv * ((1 - fu) * b[0] + fu * b[1]);
+  return (1 - fv) * ((1 - fu) * image.grey_at(iu, iv) + fu * image.grey_at(iu + 1, iv)) +
+         fv * ((1 - fu) * image.grey_at(iu, iv + 1) + fu * image.grey_at(iu + 1, iv + 1));
 }
 
 // Grey levels on both sides of an outline.
@@ -93,60 +102,67 @@ int telling(MarkStatus status) {
 
 CandidateSearch CandidateFinder::first(const ImageView& image, const PixelWindow& window,
                                        const MarkSearch& search) {
+  reduced_.prepare(image, window, reduction_for(search));
+  return start(image, search);
+}
+
+std::optional<CandidateSearch> CandidateFinder::flattened(const ImageView& image, const MarkSearch& search) {
+  if (!reduced_.flatten(flatten_share * search.min_contrast, search.max_diameter_px)) return std::nullopt;
+  return start(image, search);
+}
+
+CandidateSearch CandidateFinder::start(const ImageView& image, const MarkSearch& search) {
   groups_.clear();
   reason_ = MarkStatus::no_candidate;
-  const GreyRange range = range_of(image, window, search);
+  const GreyRange range = range_of(reduced_, search);
   low_ = range.low;
   high_ = range.high;
   step_ = 0;
   if (high_ - low_ < search.min_contrast) return {{}, MarkStatus::low_contrast, 0};
   step_ = (high_ - low_) / std::ceil((high_ - low_) / coarsest_step);
-  return look(image, window, search, low_ + step_ / 2);
+  return look(image, search, low_ + step_ / 2);
 }
 
-std::optional<CandidateSearch> CandidateFinder::finer(const ImageView& image, const PixelWindow& window,
-                                                      const MarkSearch& search) {
+std::optional<CandidateSearch> CandidateFinder::finer(const ImageView& image, const MarkSearch& search) {
   if (step_ < 2 * finest_step) return std::nullopt;
   step_ /= 2;
-  return look(image, window, search, low_ + step_ / 2);
+  return look(image, search, low_ + step_ / 2);
 }
 
-CandidateSearch CandidateFinder::look(const ImageView& image, const PixelWindow& window,
-                                      const MarkSearch& search, double first_level) {
+CandidateSearch CandidateFinder::look(const ImageView& image, const MarkSearch& search, double first_level) {
   for (double level = first_level; level < high_; level += step_) {
-    look_at_level(image, window, search, static_cast<int>(std::lround(level)));
+    look_at_level(search, static_cast<int>(std::lround(level)));
   }
   CandidateSearch result = judge(image, search);
   result.step_grey = step_;
   return result;
 }
 
-void CandidateFinder::look_at_level(const ImageView& image, const PixelWindow& window,
-                                    const MarkSearch& search, int level) {
+void CandidateFinder::look_at_level(const MarkSearch& search, int level) {
   const auto suggest = [this](MarkStatus status) {
     if (telling(status) > telling(reason_)) reason_ = status;
   };
-  const double largest = search.max_diameter_px + size_margin_px;
-  const BlobLimits limits{std::max(4.0, 0.4 * search.min_diameter_px), largest};
-  for (const Blob& blob : blobs_.find(image, window, level, search.bright, limits)) {
-    const double longest = std::max(blob.box.width(), blob.box.height());
+  const double scale = reduced_.reduction();  // all below in pixels of the image
+  const double largest = search.max_diameter_px + size_margin_px * scale;
+  const BlobLimits limits{std::max(4.0, 0.4 * search.min_diameter_px / scale), largest / scale};
+  for (const Blob& blob : blobs_.find(reduced_, level, search.bright, limits)) {
+    const double longest = scale * std::max(blob.box.width(), blob.box.height());
     const double box_area = double(blob.box.width()) * blob.box.height();
     if (blob.touches_window) {
-      if (longest > 0.6 * search.min_diameter_px && double(blob.area) > 0.65 * box_area) {
+      if (longest > 0.6 * search.min_diameter_px && double(blob.area) > 0.65 * box_area)
         suggest(MarkStatus::cut_off);
-      }
       continue;
     }
-    const HalfAxes axes = half_axes(blob.shape_px2);
-    if (!(blob.misfit_px < 0.5 + 0.01 * axes.major_px) ||
-        axes.minor_px < (search.min_axis_ratio - 0.1) * axes.major_px || 2 * axes.major_px > largest) {
+    const HalfAxes axes = half_axes(scale * scale * blob.shape_px2);
+    if (!(blob.misfit_px < 0.5 + 0.01 * axes.major_px / scale) ||
+        axes.minor_px < (search.min_axis_ratio - 0.1) * axes.major_px || 2 * axes.major_px > largest)
       continue;
-    }
-    if (2 * axes.major_px < search.min_diameter_px - size_margin_px || axes.minor_px < 1.8) {
+    if (2 * axes.major_px < search.min_diameter_px - size_margin_px * scale || axes.minor_px < 1.8) {
       if (2 * axes.major_px > 0.6 * search.min_diameter_px) suggest(MarkStatus::too_small);
       continue;
     }
-    add({blob.centre_px, blob.shape_px2, axes.major_px, axes.minor_px, level});
+    add({reduced_.in_image(blob.centre_px), scale * scale * blob.shape_px2, axes.major_px, axes.minor_px,
+         level});
   }
 }
 

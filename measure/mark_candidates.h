@@ -8,6 +8,7 @@
 #include "measure/ellipse_fit.h"
 #include "measure/mark_blobs.h"
 #include "measure/marks.h"
+#include "measure/search_image.h"
 
 namespace zeropose {
 
@@ -31,8 +32,10 @@ class CandidateFinder {
 
   // At half the step of the call before, in the same window; all that was seen up to then. Nothing when that
   // would be finer than makes sense.
-  std::optional<CandidateSearch> finer(const ImageView& image, const PixelWindow& window,
-                                       const MarkSearch& search);
+  std::optional<CandidateSearch> finer(const ImageView& image, const MarkSearch& search);
+
+  // As first() in the same window, without the light's falling off. Nothing when it does not fall off.
+  std::optional<CandidateSearch> flattened(const ImageView& image, const MarkSearch& search);
 
  private:
   struct Sighting {
@@ -43,12 +46,13 @@ class CandidateFinder {
   };
   using Group = std::vector<Sighting>;
 
-  CandidateSearch look(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                       double first_level);
-  void look_at_level(const ImageView& image, const PixelWindow& window, const MarkSearch& search, int level);
+  CandidateSearch start(const ImageView& image, const MarkSearch& search);
+  CandidateSearch look(const ImageView& image, const MarkSearch& search, double first_level);
+  void look_at_level(const MarkSearch& search, int level);
   void add(const Sighting& sighting);
   CandidateSearch judge(const ImageView& image, const MarkSearch& search);
 
+  SearchImage reduced_;
   BlobFinder blobs_;
   std::vector<Group> groups_;
   MarkStatus reason_ = MarkStatus::no_candidate;

@@ -19,4 +19,9 @@ inline constexpr double plain_model_share = 0.04, sharpened_model_share = 0.1;
 MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
                      EllipseWorkspace& workspace, double model_share = plain_model_share);
 
+// The same where the outline is spoilt in places: at least 0.6 of it must agree on one ellipse, the rest lie
+// in at most four stretches.
+MarkFinding fit_covered_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
+                             EllipseWorkspace& workspace);
+
 }  // namespace zeropose

@@ -1,0 +1,156 @@
+#include "measure/disc_search.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "measure/covered_outline.h"
+#include "measure/mark_fit.h"
+
+namespace zeropose {
+namespace {
+
+constexpr std::size_t most_candidates = 8;  // fits per window and look
+constexpr double rival_contrast = 0.4;      // of the best one's: then it is a rival
+
+// How near to a found mark a failed one came.
+int telling(MarkStatus status) {
+  switch (status) {
+    case MarkStatus::too_small:
+      return 1;
+    case MarkStatus::not_converged:
+      return 2;
+    case MarkStatus::low_contrast:
+      return 3;
+    case MarkStatus::blurred:
+      return 4;
+    case MarkStatus::cut_off:
+      return 5;
+    default:
+      return 0;
+  }
+}
+
+bool stands(const MarkFinding& finding) {
+  return finding.status == MarkStatus::found || finding.status == MarkStatus::saturated;
+}
+
+// The same thing, taken up twice from different grey levels.
+bool same_place(const MarkFinding& a, const MarkFinding& b) {
+  return (a.u_px - b.u_px).norm() < 0.5 && std::abs(a.diameter_px - b.diameter_px) < 1;
+}
+
+void take(const MarkFinding& finding, DiscSight& sight) {
+  if (!stands(finding)) {
+    if (telling(finding.status) >= telling(sight.nearest.status)) sight.nearest = finding;
+    return;
+  }
+  for (const MarkFinding& known : sight.standing)
+    if (same_place(known, finding)) return;
+  const auto behind =
+      std::find_if(sight.standing.begin(), sight.standing.end(),
+                   [&](const MarkFinding& known) { return known.contrast < finding.contrast; });
+  sight.standing.insert(behind, finding);
+}
+
+DiscSight sight_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
+                   EllipseWorkspace& workspace) {
+  DiscSight sight;
+  sight.nearest.status = seen.reason;
+  for (std::size_t k = 0; k < std::min(most_candidates, seen.candidates.size()); ++k)
+    take(fit_mark(image, search, seen.candidates[k].start, workspace), sight);
+  return sight;
+}
+
+// Levels so far apart that a rival could slip through call for a closer look.
+bool decided(const DiscSight& sight, const CandidateSearch& seen) {
+  const MarkFinding best = sight.only();
+  return best.status == MarkStatus::ambiguous ||
+         (stands(best) && seen.step_grey < 0.75 * rival_contrast * best.contrast);
+}
+
+// At finer and finer grey levels.
+DiscSight look_at_regions(const ImageView& image, const MarkSearch& search,
+                          std::optional<CandidateSearch> seen, MarkWorkspace& workspace) {
+  DiscSight sight;
+  while (seen) {
+    sight = sight_of(image, search, *seen, workspace.ellipse);
+    if (decided(sight, *seen)) break;
+    seen = workspace.candidates.finer(image, search);
+  }
+  return sight;
+}
+
+double grey_near(const ImageView& image, const Eigen::Vector2d& at) {
+  return image.grey_at(std::clamp(static_cast<int>(std::lround(at.x())), 0, image.width_px - 1),
+                       std::clamp(static_cast<int>(std::lround(at.y())), 0, image.height_px - 1));
+}
+
+// The middle grey level on an ellipse of that share of the size, where the outline can be seen.
+double grey_at_share(const ImageView& image, const EllipseStart& start, double share) {
+  const Eigen::LLT<Eigen::Matrix2d> root(start.shape_px2);
+  std::array<double, SectorOf::count> greys{};
+  std::size_t n = 0;
+  for (int k = 0; k < SectorOf::count; ++k) {
+    if ((start.hidden >> k & 1) != 0) continue;
+    const double angle = ((k + 0.5) / (SectorOf::count / 2) - 1) * std::numbers::pi;
+    const Eigen::Vector2d on = root.matrixL() * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    greys[n++] = grey_near(image, start.centre_px + share * on);
+  }
+  if (n == 0) return 0;
+  std::nth_element(greys.begin(), greys.begin() + std::ptrdiff_t(n / 2), greys.begin() + std::ptrdiff_t(n));
+  return greys[n / 2];
+}
+
+// A disc is of one surface; what has another one inside is a ring. A ball may have its highlight.
+bool filled(const ImageView& image, const MarkSearch& search, const EllipseStart& start) {
+  if (search.kind == MarkKind::ball) return true;
+  const double contrast = start.background_grey - start.mark_grey;
+  for (const double share : {0.35, 0.65})
+    if ((grey_at_share(image, start, share) - start.mark_grey) / contrast > 0.4) return false;
+  return true;
+}
+
+void look_at_outlines(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                      EllipseWorkspace& workspace, DiscSight& sight) {
+  for (const CoveredOutline& outline : covered_outlines(image, window, search)) {
+    EllipseStart start = outline.start;
+    const double rim = std::max(0.0, 1 - 2.5 / half_axes(start.shape_px2).minor_px);
+    start.mark_grey = grey_at_share(image, start, rim);
+    start.background_grey = grey_at_share(image, start, 2 - rim);
+    const double contrast = (start.background_grey - start.mark_grey) * (search.bright ? -1 : 1);
+    if (!(contrast > 0.5 * search.min_contrast) || !filled(image, search, start)) continue;
+    const MarkFinding finding = fit_covered_mark(image, search, start, workspace);
+    if (finding.status != MarkStatus::not_converged) take(finding, sight);
+  }
+}
+
+}  // namespace
+
+MarkFinding DiscSight::only() const {
+  if (standing.empty()) return nearest;
+  MarkFinding best = standing.front();
+  const bool rival = standing.size() > 1 && standing[1].contrast > rival_contrast * best.contrast;
+  if (rival) best.status = MarkStatus::ambiguous;
+  return best;
+}
+
+DiscSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                         MarkWorkspace& workspace) {
+  CandidateFinder& finder = workspace.candidates;
+  DiscSight sight = look_at_regions(image, search, finder.first(image, window, search), workspace);
+  if (!sight.standing.empty()) return sight;
+  if (auto seen = finder.flattened(image, search)) {
+    DiscSight flat = look_at_regions(image, search, std::move(seen), workspace);
+    if (telling(flat.nearest.status) < telling(sight.nearest.status)) flat.nearest = sight.nearest;
+    sight = std::move(flat);
+    if (!sight.standing.empty()) return sight;
+  }
+  look_at_outlines(image, window, search, workspace.ellipse, sight);
+  return sight;
+}
+
+}  // namespace zeropose

@@ -1,0 +1,31 @@
+// Discs, holes and balls in a window: what stands there, or what came nearest.
+#pragma once
+
+#include <vector>
+
+#include "measure/ellipse_fit.h"
+#include "measure/mark_candidates.h"
+#include "measure/marks.h"
+
+namespace zeropose {
+
+// Memory kept from one search to the next. Holds no results.
+struct MarkWorkspace {
+  CandidateFinder candidates;
+  EllipseWorkspace ellipse;
+};
+
+struct DiscSight {
+  std::vector<MarkFinding> standing;  // found, or would be if they were not saturated; best contrast first
+  MarkFinding nearest;                // what came nearest to one where none stands
+
+  // The one mark of the window, ambiguous where a second one stands beside it.
+  MarkFinding only() const;
+};
+
+// First as regions at grey levels; where that finds none, without the light's falling off, and then by their
+// outline, of which parts may be covered. Precondition: the search makes sense and its window is not empty.
+DiscSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                         MarkWorkspace& workspace);
+
+}  // namespace zeropose

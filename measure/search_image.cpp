@@ -1,0 +1,195 @@
+#include "measure/search_image.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "measure/small_cholesky.h"
+
+namespace zeropose {
+namespace {
+
+template <typename Pixel>
+void add_columns(const Pixel* __restrict row, int width, std::uint32_t* __restrict sums) {
+  for (int i = 0; i < width; ++i) sums[i] += row[i];
+}
+
+void reduce_bytes_by_two(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, int width,
+                         std::uint8_t* __restrict out) {
+  for (int i = 0; i < width; ++i)
+    out[i] = static_cast<std::uint8_t>((a[2 * i] + a[2 * i + 1] + b[2 * i] + b[2 * i + 1] + 2) >> 2);
+}
+
+// Second order in x and y, both scaled to about -1..1.
+using Surface = Eigen::Matrix<double, 6, 1>;
+
+Surface terms_at(double x, double y) {
+  Surface terms;
+  terms << 1, x, y, x * x, x * y, y * y;
+  return terms;
+}
+
+using FlatTile = SearchImage::FlatTile;
+
+// A first look, cheap: the mean levels of the thirds across and down.
+bool light_falls_off(const std::vector<FlatTile>& flat, double over_x, double over_y, double from_grey) {
+  std::array<double, 3> across{}, down{}, n_across{}, n_down{};
+  for (const FlatTile& tile : flat) {
+    const auto i = static_cast<std::size_t>(std::clamp((tile.x + 1) * 1.5, 0.0, 2.0));
+    const auto j = static_cast<std::size_t>(std::clamp((tile.y + 1) * 1.5, 0.0, 2.0));
+    across[i] += tile.grey, ++n_across[i];
+    down[j] += tile.grey, ++n_down[j];
+  }
+  const auto largest_step = [](const std::array<double, 3>& sum, const std::array<double, 3>& n) {
+    const auto mean = [&](std::size_t i) { return sum[i] / std::max(1.0, n[i]); };
+    double step = 0;
+    for (std::size_t i = 0; i < 2; ++i)
+      if (n[i] > 0 && n[i + 1] > 0) step = std::max(step, std::abs(mean(i + 1) - mean(i)));
+    return 3 * step;
+  };
+  return largest_step(across, n_across) * over_x + largest_step(down, n_down) * over_y > from_grey;
+}
+
+// Least squares of the tiles that carry one surface: those far off are left out step by step.
+bool fit_surface(const std::vector<FlatTile>& flat, Surface& surface) {
+  double most = 1e9;
+  for (int round = 0; round < 6; ++round) {
+    Eigen::Matrix<double, 6, 6> N = 1e-9 * Eigen::Matrix<double, 6, 6>::Identity();
+    Surface g = Surface::Zero();
+    for (const FlatTile& tile : flat) {
+      const Surface terms = terms_at(tile.x, tile.y);
+      if (std::abs(tile.grey - surface.dot(terms)) > most) continue;
+      N += terms * terms.transpose();
+      g += tile.grey * terms;
+    }
+    const SmallCholesky<6> solver(N);
+    if (N(0, 0) < 12 || !solver.ok()) return false;
+    surface = solver.solve(g);
+    std::vector<double> off;
+    for (const FlatTile& tile : flat)
+      off.push_back(std::abs(tile.grey - surface.dot(terms_at(tile.x, tile.y))));
+    const auto middle = off.begin() + std::ptrdiff_t(off.size() / 2);
+    std::nth_element(off.begin(), middle, off.end());
+    most = 3 * *middle + 1;
+  }
+  return surface.allFinite();
+}
+
+}  // namespace
+
+void SearchImage::prepare(const ImageView& image, const PixelWindow& window, int reduction) {
+  reduction_ = reduction;
+  width_ = window.width() / reduction;
+  height_ = window.height() / reduction;
+  stride_ = (width_ + tile_width - 1) / tile_width * tile_width;
+  const double half = 0.5 * (reduction - 1);
+  origin_px_ = {window.u0 + half, window.v0 + half};
+  greys_.resize(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(std::max(0, height_)));
+  if (empty()) return;
+  if (image.two_bytes()) {
+    reduce<std::uint16_t>(image, window);
+  } else {
+    reduce<std::uint8_t>(image, window);
+  }
+  for (int v = 0; v < height_; ++v) {
+    std::uint8_t* row = greys_.data() + std::ptrdiff_t{v} * stride_;
+    std::fill(row + width_, row + stride_, row[width_ - 1]);
+  }
+  measure_tiles();
+}
+
+template <typename Pixel>
+void SearchImage::reduce(const ImageView& image, const PixelWindow& window) {
+  for (int v = 0; v < height_; ++v) {
+    std::uint8_t* __restrict out = greys_.data() + std::ptrdiff_t{v} * stride_;
+    const int from = window.v0 + v * reduction_;
+    if (sizeof(Pixel) == 1 && reduction_ == 1) {
+      std::copy_n(image.row(from) + window.u0, width_, out);
+      continue;
+    }
+    if (sizeof(Pixel) == 1 && reduction_ == 2) {
+      reduce_bytes_by_two(image.row(from) + window.u0, image.row(from + 1) + window.u0, width_, out);
+      continue;
+    }
+    sums_.assign(static_cast<std::size_t>(width_ * reduction_), 0);
+    for (int k = 0; k < reduction_; ++k)
+      add_columns(image.row<Pixel>(from + k) + window.u0, width_ * reduction_, sums_.data());
+    const float scale =
+        static_cast<float>(image.grey_per_count()) / static_cast<float>(reduction_ * reduction_);
+    for (int i = 0; i < width_; ++i) {
+      std::uint32_t sum = 0;
+      for (int k = 0; k < reduction_; ++k) sum += sums_[static_cast<std::size_t>(i * reduction_ + k)];
+      out[i] = static_cast<std::uint8_t>(std::min(255.0F, static_cast<float>(sum) * scale + 0.5F));
+    }
+  }
+}
+
+void SearchImage::measure_tiles() {
+  tiles_.assign(static_cast<std::size_t>(tile_columns()) * static_cast<std::size_t>(tile_rows()), {});
+  for (int row = 0; row < tile_rows(); ++row) {
+    const int from = row * tile_height, to = std::min(height_, from + tile_height);
+    TileRange* tiles = tiles_.data() + std::ptrdiff_t{row} * tile_columns();
+    for (int column = 0; column < tile_columns(); ++column) {
+      std::array<std::uint8_t, tile_width> low, high;
+      low.fill(255);
+      high.fill(0);
+      for (int v = from; v < to; ++v) {
+        const std::uint8_t* greys = this->row(v) + column * tile_width;
+        for (std::size_t i = 0; i < tile_width; ++i) low[i] = std::min(low[i], greys[i]);
+        for (std::size_t i = 0; i < tile_width; ++i) high[i] = std::max(high[i], greys[i]);
+      }
+      TileRange range;
+      for (std::size_t i = 0; i < tile_width; ++i) {
+        range.low = std::min(range.low, low[i]);
+        range.high = std::max(range.high, high[i]);
+      }
+      tiles[column] = range;
+    }
+  }
+}
+
+// Tiles whose range is like that of the flat ones, with their place in -1..1.
+std::vector<SearchImage::FlatTile> SearchImage::flat_tiles() const {
+  std::vector<int> ranges;
+  for (const TileRange& tile : tiles_) ranges.push_back(tile.high - tile.low);
+  const auto quarter = ranges.begin() + std::ptrdiff_t(ranges.size() / 4);
+  std::nth_element(ranges.begin(), quarter, ranges.end());
+  const int most = *quarter + *quarter / 2 + 2;
+  std::vector<FlatTile> flat;
+  for (int row = 0; row < tile_rows(); ++row)
+    for (int column = 0; column < tile_columns(); ++column) {
+      const TileRange& tile = tiles(row)[column];
+      if (tile.high - tile.low > most) continue;
+      flat.push_back({2.0 * (column + 0.5) * tile_width / stride_ - 1,
+                      2.0 * (row + 0.5) * tile_height / height_ - 1, 0.5 * (tile.low + tile.high)});
+    }
+  return flat;
+}
+
+bool SearchImage::flatten(double from_grey, double over_px) {
+  if (tiles_.size() < 24) return false;
+  const std::vector<FlatTile> flat = flat_tiles();
+  const double over_x = over_px / reduction_ / stride_, over_y = over_px / reduction_ / height_;
+  if (!(light_falls_off(flat, over_x, over_y, 0.5 * from_grey))) return false;
+  Surface surface = Surface::Zero();
+  if (!fit_surface(flat, surface)) return false;
+  const double fall = 2 * std::hypot((std::abs(surface(1)) + std::abs(surface(3))) * over_x,
+                                     (std::abs(surface(2)) + std::abs(surface(5))) * over_y);
+  if (!(fall > from_grey)) return false;
+  for (int v = 0; v < height_; ++v) {
+    std::uint8_t* __restrict row = greys_.data() + std::ptrdiff_t{v} * stride_;
+    const double y = 2 * (v + 0.5) / height_ - 1;
+    const auto a = static_cast<float>(surface(0) + y * (surface(2) + y * surface(5)) - 128);
+    const auto b = static_cast<float>(surface(1) + y * surface(4)), c = static_cast<float>(surface(3));
+    const float scale = 2.0F / static_cast<float>(stride_);
+    for (int u = 0; u < stride_; ++u) {
+      const float x = scale * (static_cast<float>(u) + 0.5F) - 1;
+      const float grey = static_cast<float>(row[u]) - (a + x * (b + x * c)) + 0.5F;
+      row[u] = static_cast<std::uint8_t>(std::clamp(grey, 0.0F, 255.0F));
+    }
+  }
+  measure_tiles();
+  return true;
+}
+
+}  // namespace zeropose
