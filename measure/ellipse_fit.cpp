@@ -23,6 +23,8 @@ State state_of(const EllipseStart& start, const EllipseBand& band, double blur_p
   return state;
 }
 
+constexpr double near_sigmas = 12;  // a step so small meets the minimum with the normal equations it has
+
 bool is_outer(std::size_t ring) { return ring < EllipseBand::outer_rings; }
 
 Eigen::Vector3d plane_of(const State& state, std::size_t ring) {
@@ -126,12 +128,18 @@ struct Descent {
   void try_state(const State& next, Wanted wanted);
 };
 
-// The first step, from the region's outline, can do with half of the pixels.
+// The first steps, from the region's outline, can do with a part of the pixels.
 void Descent::start_coarsely() {
-  evaluate_edge(band, state, Wanted::all, normal, sectors, 2);
-  State next = state;
-  next.at += step_from(normal, 1e-3);
-  if (next.plausible() && (next.at - state.at).head<2>().norm() < 1) state = next;
+  const std::size_t stride = band.size() > 480 ? 4 : 2;
+  for (int round = 0; round < 2; ++round) {
+    evaluate_edge(band, state, Wanted::all, normal, sectors, stride);
+    const Unknowns step = step_from(normal, 1e-3);
+    State next = state;
+    next.at += step;
+    if (!next.plausible() || !(step.head<2>().norm() < 1)) return;
+    state = next;
+    if (step.head<2>().norm() < 0.1 && step.segment<3>(p11).norm() < 0.02) return;
+  }
 }
 
 bool Descent::choose_rings(const State& next) {
@@ -169,7 +177,7 @@ Outcome Descent::run() {
     const Unknowns step = step_from(normal, lambda);
     next.at += step;
     const double sigmas = std::sqrt(std::max(0.0, step.dot(normal.N * step)) / variance_of(normal, band));
-    if (next.plausible() && sigmas < 6 && !rings_chosen) {
+    if (next.plausible() && sigmas < near_sigmas && !rings_chosen) {
       if (!choose_rings(next)) {
         state = next;
         return Outcome::left_band;
@@ -181,7 +189,7 @@ Outcome Descent::run() {
       normal.squares -= step.dot(normal.g);
       return Outcome::done;
     }
-    try_state(next, rings_chosen && sigmas < 6 && lambda == 0 ? Wanted::gradient : Wanted::all);
+    try_state(next, rings_chosen && sigmas < near_sigmas && lambda == 0 ? Wanted::gradient : Wanted::all);
   }
   return Outcome::failed;
 }

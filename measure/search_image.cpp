@@ -14,10 +14,20 @@ void add_columns(const Pixel* __restrict row, int width, std::uint32_t* __restri
   for (int i = 0; i < width; ++i) sums[i] += row[i];
 }
 
+// Means of means, each rounded up at a half: the compiler has instructions for these.
 void reduce_bytes_by_two(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, int width,
-                         std::uint8_t* __restrict out) {
+                         std::uint8_t* __restrict both, std::uint8_t* __restrict out) {
+  for (int i = 0; i < 2 * width; ++i) both[i] = static_cast<std::uint8_t>((a[i] + b[i] + 1) >> 1);
   for (int i = 0; i < width; ++i)
-    out[i] = static_cast<std::uint8_t>((a[2 * i] + a[2 * i + 1] + b[2 * i] + b[2 * i + 1] + 2) >> 2);
+    out[i] = static_cast<std::uint8_t>((both[2 * i] + both[2 * i + 1] + 1) >> 1);
+}
+
+void widen(const std::uint8_t* __restrict greys, int width, std::uint8_t* __restrict lows,
+           std::uint8_t* __restrict highs) {
+  for (int i = 0; i < width; ++i) {
+    lows[i] = std::min(lows[i], greys[i]);
+    highs[i] = std::max(highs[i], greys[i]);
+  }
 }
 
 // Second order in x and y, both scaled to about -1..1.
@@ -108,7 +118,9 @@ void SearchImage::reduce(const ImageView& image, const PixelWindow& window) {
       continue;
     }
     if (sizeof(Pixel) == 1 && reduction_ == 2) {
-      reduce_bytes_by_two(image.row(from) + window.u0, image.row(from + 1) + window.u0, width_, out);
+      means_.resize(static_cast<std::size_t>(2 * width_));
+      reduce_bytes_by_two(image.row(from) + window.u0, image.row(from + 1) + window.u0, width_, means_.data(),
+                          out);
       continue;
     }
     sums_.assign(static_cast<std::size_t>(width_ * reduction_), 0);
@@ -125,25 +137,19 @@ void SearchImage::reduce(const ImageView& image, const PixelWindow& window) {
 }
 
 void SearchImage::measure_tiles() {
-  tiles_.assign(static_cast<std::size_t>(tile_columns()) * static_cast<std::size_t>(tile_rows()), {});
-  for (int row = 0; row < tile_rows(); ++row) {
-    const int from = row * tile_height, to = std::min(height_, from + tile_height);
-    TileRange* tiles = tiles_.data() + std::ptrdiff_t{row} * tile_columns();
+  tiles_.resize(static_cast<std::size_t>(tile_columns()) * static_cast<std::size_t>(tile_rows()));
+  lows_.resize(static_cast<std::size_t>(stride_));
+  highs_.resize(static_cast<std::size_t>(stride_));
+  for (int tile_row = 0; tile_row < tile_rows(); ++tile_row) {
+    const int from = tile_row * tile_height, to = std::min(height_, from + tile_height);
+    std::copy_n(row(from), stride_, lows_.data());
+    std::copy_n(row(from), stride_, highs_.data());
+    for (int v = from + 1; v < to; ++v) widen(row(v), stride_, lows_.data(), highs_.data());
+    TileRange* tiles = tiles_.data() + std::ptrdiff_t{tile_row} * tile_columns();
     for (int column = 0; column < tile_columns(); ++column) {
-      std::array<std::uint8_t, tile_width> low, high;
-      low.fill(255);
-      high.fill(0);
-      for (int v = from; v < to; ++v) {
-        const std::uint8_t* greys = this->row(v) + column * tile_width;
-        for (std::size_t i = 0; i < tile_width; ++i) low[i] = std::min(low[i], greys[i]);
-        for (std::size_t i = 0; i < tile_width; ++i) high[i] = std::max(high[i], greys[i]);
-      }
-      TileRange range;
-      for (std::size_t i = 0; i < tile_width; ++i) {
-        range.low = std::min(range.low, low[i]);
-        range.high = std::max(range.high, high[i]);
-      }
-      tiles[column] = range;
+      const auto first = std::ptrdiff_t{column} * tile_width;
+      tiles[column] = {*std::min_element(lows_.begin() + first, lows_.begin() + first + tile_width),
+                       *std::max_element(highs_.begin() + first, highs_.begin() + first + tile_width)};
     }
   }
 }

@@ -53,6 +53,7 @@ class SearchImage {
   Eigen::Vector2d origin_px_ = Eigen::Vector2d::Zero();  // the first pixel's centre
   std::vector<std::uint8_t> greys_;
   std::vector<TileRange> tiles_;
+  std::vector<std::uint8_t> lows_, highs_, means_;  // of a row
   std::vector<std::uint32_t> sums_;
 };
 
