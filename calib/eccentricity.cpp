@@ -17,8 +17,9 @@ struct Outline {
   Vector2d d1, d2;  // conjugate half diameters
 };
 
-// From the dual conic r^2 (I - n n^T) - p p^T, scaled to -p_z^2 + ... = -1 in its last element.
-bool outline_of_disc(const Vector3d& p, const Vector3d& n, double radius, Outline& outline) {
+// From the dual conic r^2 (I - n n^T) - p p^T, scaled to -p_z^2 + ... = -1 in its last element; n zero: a
+// ball.
+bool outline_of(const Vector3d& p, const Vector3d& n, double radius, Outline& outline) {
   const double r2 = radius * radius;
   const double depth2 = p.z() * p.z() - r2 * (1 - n.z() * n.z());
   if (!(depth2 > 0)) return false;
@@ -88,20 +89,28 @@ Vector2d shift_by_bend(const Vector2d& e1, const Vector2d& e2, const Bend& bend)
   return Vector2d(nyy * rx - nxy * ry, nxx * ry - nxy * rx) / det;
 }
 
+Vector2d offset_of(const CameraModel& camera, const Vector3d& p_CM_mm, const Vector3d& n, double radius_mm) {
+  const auto mark = project(camera, p_CM_mm);
+  Outline outline;
+  if (!mark || !outline_of(p_CM_mm, n, radius_mm, outline)) return Vector2d::Zero();
+  const auto centre = project_with_jacobian(camera, Vector3d(outline.centre.x(), outline.centre.y(), 1));
+  Bend bend;
+  if (!centre || !bend_of_lens(camera, outline, bend)) return Vector2d::Zero();
+  const Matrix2d slope = centre->du_dp.leftCols<2>();
+  return centre->u_px + shift_by_bend(slope * outline.d1, slope * outline.d2, bend) - *mark;
+}
+
 }  // namespace
 
 Vector2d ellipse_centre_offset(const CameraModel& camera, const Vector3d& p_CM_mm, const Vector3d& normal_C,
                                double radius_mm) {
   const double length = normal_C.norm();
   if (!(length > 0) || !(radius_mm > 0)) return Vector2d::Zero();
-  const auto mark = project(camera, p_CM_mm);
-  Outline outline;
-  if (!mark || !outline_of_disc(p_CM_mm, normal_C / length, radius_mm, outline)) return Vector2d::Zero();
-  const auto centre = project_with_jacobian(camera, Vector3d(outline.centre.x(), outline.centre.y(), 1));
-  Bend bend;
-  if (!centre || !bend_of_lens(camera, outline, bend)) return Vector2d::Zero();
-  const Matrix2d slope = centre->du_dp.leftCols<2>();
-  return centre->u_px + shift_by_bend(slope * outline.d1, slope * outline.d2, bend) - *mark;
+  return offset_of(camera, p_CM_mm, normal_C / length, radius_mm);
+}
+
+Vector2d ball_centre_offset(const CameraModel& camera, const Vector3d& p_CM_mm, double radius_mm) {
+  return radius_mm > 0 ? offset_of(camera, p_CM_mm, Vector3d::Zero(), radius_mm) : Vector2d::Zero();
 }
 
 }  // namespace zeropose

@@ -23,4 +23,10 @@ namespace zeropose {
 Eigen::Vector2d ellipse_centre_offset(const CameraModel& camera, const Eigen::Vector3d& p_CM_mm,
                                       const Eigen::Vector3d& normal_C, double radius_mm);
 
+// The same for a ball: centre of its outline's image minus the projection of its centre, px. The outline is
+// the cone that touches it, with the dual r^2 I - p p^T. Zero when the radius is 0, or the ball has no image
+// as a whole.
+Eigen::Vector2d ball_centre_offset(const CameraModel& camera, const Eigen::Vector3d& p_CM_mm,
+                                   double radius_mm);
+
 }  // namespace zeropose

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
-#include "calib/eccentricity.h"
 #include "calib/words.h"
+#include "measure/mark_image.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -68,8 +68,8 @@ class Relaxation {
     glance.p_CQ_mm = X_CO * (mark.p_O_mm + shifts_[observation.mark]);
     const auto projection = project_with_jacobian(camera.model, glance.p_CQ_mm);
     if (!projection) return std::nullopt;
-    const Vector2d offset =
-        ellipse_centre_offset(camera.model, glance.p_CQ_mm, X_CO.linear() * mark.normal_O, mark.radius_mm);
+    const Vector2d offset = image_offset(camera.model, mark, glance.p_CQ_mm, X_CO.linear() * mark.normal_O,
+                                         observation.radius_share);
     glance.gap_px = observation.u_px - projection->u_px - offset;
     glance.by_p_O = projection->du_dp * X_CO.linear();
     return glance;

@@ -14,16 +14,17 @@ namespace zeropose {
 
 inline constexpr double no_tolerance = std::numeric_limits<double>::infinity();
 
-// A flat round mark on the object.
+// A mark on the object.
 struct Mark {
   std::string name;
   MarkKind kind = MarkKind::disc;
   bool bright = false;                                 // brighter than what surrounds it
   Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();    // its centre
   Eigen::Vector3d normal_O = Eigen::Vector3d::Zero();  // of its plane, towards the camera; zero: unknown
-  double radius_mm = 0;                                // 0: unknown; then no eccentricity correction
-  double weight = 1;                   // the user's factor 0..1; 0: only its deviation is reported
-  double tolerance_px = no_tolerance;  // largest deviation
+  double radius_mm = 0;                  // of its outline; 0: unknown; then no eccentricity correction
+  std::vector<double> inner_radii_mm{};  // of a ring's further circles, descending
+  double weight = 1;                     // the user's factor 0..1; 0: only its deviation is reported
+  double tolerance_px = no_tolerance;    // largest deviation
   double tolerance_mm = no_tolerance;
   double sigma_mm = 0;  // non-rigidity of the place it sits on
 };

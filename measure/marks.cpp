@@ -4,15 +4,33 @@
 #include <cmath>
 
 #include "measure/disc_search.h"
+#include "measure/ring_search.h"
 
 namespace zeropose {
 namespace {
 
-bool makes_sense(const ImageView& image, const MarkSearch& s) {
-  return image.data != nullptr && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
-         (s.half_window_px.array() >= 0).all() && std::isfinite(s.max_diameter_px) && s.min_diameter_px > 0 &&
+bool shares_descend(const std::vector<double>& shares) {
+  double outer = 1;
+  for (const double share : shares) {
+    if (!(share > 0 && share < outer)) return false;
+    outer = share;
+  }
+  return !shares.empty();
+}
+
+bool makes_sense(const MarkSearch& s) {
+  return s.expected_px.allFinite() && s.half_window_px.allFinite() && (s.half_window_px.array() >= 0).all() &&
+         std::isfinite(s.max_diameter_px) && s.min_diameter_px > 0 &&
          s.min_diameter_px <= s.max_diameter_px && s.min_axis_ratio > 0 && s.min_axis_ratio <= 1 &&
-         s.min_contrast > 0;
+         s.min_contrast > 0 && s.max_blur_px > 0 &&
+         (s.kind != MarkKind::ring || shares_descend(s.inner_shares));
+}
+
+// Found: there is something to search in.
+MarkStatus first_look(const ImageView& image, const MarkSearch& search) {
+  if (image.data == nullptr || image.width_px < 2 || image.height_px < 2) return MarkStatus::outside_image;
+  if (!makes_sense(search)) return MarkStatus::not_searched;
+  return window_of(image, search).empty() ? MarkStatus::outside_image : MarkStatus::found;
 }
 
 int pixel_of(double place, int size) { return static_cast<int>(std::clamp(place, -1.0, double(size))); }
@@ -24,12 +42,23 @@ MarkFinding with_status(MarkStatus status) {
 }
 
 MarkFinding find_mark(const ImageView& image, const MarkSearch& search, MarkWorkspace& workspace) {
-  if (image.data == nullptr || image.width_px < 2 || image.height_px < 2)
-    return with_status(MarkStatus::outside_image);
-  if (!makes_sense(image, search)) return {};
+  if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
+    return with_status(status);
   const PixelWindow window = window_of(image, search);
-  if (window.empty()) return with_status(MarkStatus::outside_image);
-  return look_for_discs(image, window, search, workspace).only();
+  switch (search.kind) {
+    case MarkKind::disc:
+    case MarkKind::ball:
+      return look_for_discs(image, window, search, workspace).only();
+    case MarkKind::ring:
+      return find_ring(image, window, search, workspace);
+    case MarkKind::slot:
+    case MarkKind::cross:
+    case MarkKind::corner:
+    case MarkKind::edge:
+    case MarkKind::pattern:
+      break;
+  }
+  return {};
 }
 
 }  // namespace
@@ -42,40 +71,31 @@ PixelWindow window_of(const ImageView& image, const MarkSearch& s) {
           std::min(image.height_px - 1, pixel_of(std::floor(high.y()), image.height_px))};
 }
 
-std::string_view name_of(MarkStatus status) {
-  switch (status) {
-    case MarkStatus::not_searched:
-      return "not_searched";
-    case MarkStatus::found:
-      return "found";
-    case MarkStatus::outside_image:
-      return "outside_image";
-    case MarkStatus::no_candidate:
-      return "no_candidate";
-    case MarkStatus::too_small:
-      return "too_small";
-    case MarkStatus::low_contrast:
-      return "low_contrast";
-    case MarkStatus::blurred:
-      return "blurred";
-    case MarkStatus::saturated:
-      return "saturated";
-    case MarkStatus::cut_off:
-      return "cut_off";
-    case MarkStatus::ambiguous:
-      return "ambiguous";
-    case MarkStatus::not_converged:
-      return "not_converged";
-  }
-  return "unknown";
-}
-
 std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const MarkSearch> searches) {
   std::vector<MarkFinding> findings;
   findings.reserve(searches.size());
   MarkWorkspace workspace;
   for (const MarkSearch& search : searches) findings.push_back(find_mark(image, search, workspace));
   return findings;
+}
+
+std::vector<std::vector<MarkFinding>> find_mark_candidates(const ImageView& image,
+                                                           std::span<const MarkSearch> searches) {
+  std::vector<std::vector<MarkFinding>> all;
+  MarkWorkspace workspace;
+  for (const MarkSearch& search : searches) {
+    std::vector<MarkFinding>& found = all.emplace_back();
+    const bool disc = search.kind == MarkKind::disc || search.kind == MarkKind::ball;
+    if (const MarkStatus status = first_look(image, search); status != MarkStatus::found) continue;
+    if (disc) {
+      for (MarkFinding& finding : look_for_discs(image, window_of(image, search), search, workspace).standing)
+        if (finding.status == MarkStatus::found) found.push_back(std::move(finding));
+    } else if (MarkFinding finding = find_mark(image, search, workspace);
+               finding.status == MarkStatus::found) {
+      found.push_back(std::move(finding));
+    }
+  }
+  return all;
 }
 
 }  // namespace zeropose

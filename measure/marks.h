@@ -63,6 +63,7 @@ enum class MarkStatus {
   not_converged
 };
 std::string_view name_of(MarkStatus status);
+std::string_view name_of(MarkKind kind);
 
 // One per search. Where no mark was found the numbers are those of what came nearest to one, 0 if nothing
 // did.
@@ -90,6 +91,11 @@ struct MarkFinding {
 // round) is not_searched, an empty image or a window beside the image outside_image. Saturated: at white; a
 // mark at 0 is measured.
 std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const MarkSearch> searches);
+
+// All things in the window of each search that pass for its mark, the highest contrast first: for the
+// geometry of several marks to choose from. Empty where find_marks() would not say found or ambiguous.
+std::vector<std::vector<MarkFinding>> find_mark_candidates(const ImageView& image,
+                                                           std::span<const MarkSearch> searches);
 
 // Why it was not found, with the numbers and the limit they miss, for people.
 std::string reason_text(const MarkFinding& finding, const MarkSearch& search);

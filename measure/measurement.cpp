@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/words.h"
+#include "measure/association.h"
 #include "measure/security.h"
 
 namespace zeropose {
@@ -21,6 +22,9 @@ constexpr double smallest_diameter_px = 4;
 MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double search_mm, const Pose& X_WO) {
   MarkSearch search;
   search.kind = mark.kind;
+  search.bright = mark.bright;
+  for (const double radius_mm : mark.inner_radii_mm)
+    search.inner_shares.push_back(radius_mm / mark.radius_mm);
   const Pose X_CO = camera.X_WC.inverse() * X_WO;
   const Eigen::Vector3d p_CQ = X_CO * mark.p_O_mm;
   const auto u_px = project(camera.model, p_CQ);
@@ -81,18 +85,23 @@ Verdict check_images(std::span<const CameraImage> images, const Job& job,
   return {Code::ok, {}};
 }
 
-// The views that were found, and why the others were not, in the words of the finder.
-std::vector<View> found_views(const Job& job, std::span<const MarkFinding> findings, std::string& misses) {
+std::vector<View> found_views(const Job& job, std::span<const MarkFinding> findings) {
   std::vector<View> found;
-  for (std::size_t i = 0; i < job.views.size(); ++i) {
-    if (findings[i].status == MarkStatus::found) {
-      found.push_back(job.views[i]);
-      continue;
-    }
-    misses += (misses.empty() ? "" : ", ") + job.marks[job.views[i].mark].name + " " +
-              std::string(name_of(findings[i].status));
-  }
+  for (std::size_t i = 0; i < job.views.size(); ++i)
+    if (findings[i].status == MarkStatus::found) found.push_back(job.views[i]);
   return found;
+}
+
+// Why the others were not, in the words of the finder.
+std::string misses_of(const Job& job, std::span<const MarkFinding> findings,
+                      std::span<const MarkSearch> searches) {
+  std::string misses;
+  for (std::size_t i = 0; i < job.views.size(); ++i) {
+    if (findings[i].status == MarkStatus::found) continue;
+    misses += (misses.empty() ? "" : "; ") + job.marks[job.views[i].mark].name + " " +
+              std::string(name_of(findings[i].status)) + ": " + reason_text(findings[i], searches[i]);
+  }
+  return misses;
 }
 
 std::vector<View> effective_views(const Measurement& measurement) {
@@ -114,9 +123,12 @@ bool find_all(Measurement& measurement, std::span<const CameraImage> images, con
               std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected) {
   measurement.findings = find_job_marks(images, job, cameras, X_WO_expected);
   measurement.observations = observations_of(measurement.findings, job);
-  std::string misses;
-  Verdict verdict = check_marks(job, cameras, found_views(job, measurement.findings, misses));
-  if (verdict.code != Code::ok && !misses.empty()) verdict.reason += " (" + misses + ")";
+  Verdict verdict = check_marks(job, cameras, found_views(job, measurement.findings));
+  if (verdict.code != Code::ok) {
+    const auto searches = job_searches(job, cameras, X_WO_expected);
+    const std::string misses = misses_of(job, measurement.findings, searches);
+    if (!misses.empty()) verdict.reason += " (" + misses + ")";
+  }
   return passes(measurement, std::move(verdict));
 }
 
@@ -155,6 +167,7 @@ std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, con
                                         const Pose& X_WO_expected) {
   const std::vector<MarkSearch> all = job_searches(job, cameras, X_WO_expected);
   std::vector<MarkFinding> findings(job.views.size());
+  std::vector<std::vector<MarkFinding>> candidates(job.views.size());
   for (const CameraImage& image : images) {
     std::vector<MarkSearch> searches;
     std::vector<std::size_t> views;
@@ -166,17 +179,21 @@ std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, con
       views.push_back(i);
     }
     const auto found = find_marks(image.image, searches);
-    for (std::size_t k = 0; k < views.size(); ++k) findings[views[k]] = found[k];
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      findings[views[k]] = found[k];
+      if (found[k].status == MarkStatus::ambiguous)
+        candidates[views[k]] = find_mark_candidates(image.image, {&searches[k], 1}).front();
+    }
   }
-  return findings;
+  return decided_by_geometry(job, cameras, std::move(findings), candidates, X_WO_expected);
 }
 
 std::vector<Observation> observations_of(std::span<const MarkFinding> findings, const Job& job) {
   std::vector<Observation> observations;
   for (std::size_t i = 0; i < findings.size() && i < job.views.size(); ++i)
     if (findings[i].status == MarkStatus::found)
-      observations.push_back(
-          {job.views[i].camera, job.views[i].mark, findings[i].u_px, findings[i].covariance_px2});
+      observations.push_back({job.views[i].camera, job.views[i].mark, findings[i].u_px,
+                              findings[i].covariance_px2, findings[i].radius_share});
   return observations;
 }
 

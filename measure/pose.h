@@ -20,6 +20,7 @@ struct Observation {
   std::size_t mark = 0;
   Eigen::Vector2d u_px = Eigen::Vector2d::Zero();  // centre of the mark's image (for a disc: of the ellipse)
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Identity();
+  double radius_share = 1;  // MarkFinding::radius_share
 };
 
 struct PoseProblem {

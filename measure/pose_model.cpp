@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/eccentricity.h"
+#include "measure/mark_image.h"
 
 namespace zeropose {
 
@@ -72,7 +72,8 @@ PoseModel::PoseModel(const PoseProblem& problem)
     if (residual_ == Residual::reprojection) information = observation.covariance_px2.inverse();
     sight.information = mark.weight * mark.weight * information;
     sight.whitening = (mark.weight > 0 ? mark.weight : 1) * whitening_of(information);
-    sight.has_offset = mark.radius_mm > 0 && !mark.normal_O.isZero();
+    sight.radius_share = observation.radius_share;
+    sight.has_offset = has_image_offset(mark);
     sight.active = mark.weight > 0;
     if (!sight.active) continue;
     ++count;
@@ -115,7 +116,7 @@ void PoseModel::refresh_offsets(const CentredPose& pose) {
     if (!sight.has_offset) continue;
     const Vector3d p_C = sight.R_CW * (pose.R_WO * sight.p_MQ_mm + pose.p_WM_mm - sight.p_WC_mm);
     const Vector3d normal_C = sight.R_CW * (pose.R_WO * sight.mark->normal_O);
-    sight.offset_px = ellipse_centre_offset(*sight.camera, p_C, normal_C, sight.mark->radius_mm);
+    sight.offset_px = image_offset(*sight.camera, *sight.mark, p_C, normal_C, sight.radius_share);
   }
 }
 

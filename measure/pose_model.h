@@ -44,7 +44,8 @@ struct Sight {
   bool active = false;          // takes part in the estimate
   bool visible = false;         // has an image at the pose of the linearisation
 
-  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  // eccentricity of the disc's image
+  double radius_share = 1;                              // of the mark's radius: the circle that was measured
+  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  // eccentricity of the mark's image
   Eigen::Vector2d r = Eigen::Vector2d::Zero();          // px, or mm for algebraic residuals
   Eigen::Matrix<double, 2, 3> A =
       Eigen::Matrix<double, 2, 3>::Zero();           // derivative of the prediction by the mark's position
