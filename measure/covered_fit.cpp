@@ -10,8 +10,9 @@ namespace zeropose {
 namespace {
 
 constexpr int sectors = SectorOf::count;
-constexpr double least_share = 0.5;       // of the outline, to go on at all
-constexpr double rough_sector_px = 0.35;  // where one sector of a true outline may lie off the ellipse
+constexpr double least_share = 0.45;      // of the outline, to go on at all
+constexpr double brightest_grey = 254.5;  // not yet white
+constexpr double rough_sector_px = 0.2;   // where one sector of a true outline may lie off the ellipse
 constexpr int most_rounds = 12, freely = 5;
 
 // The outline with what is known of its blur.
@@ -23,6 +24,7 @@ struct Shape {
 // What the pixels of one sector say about the fitted model.
 struct Sector {
   double n = 0, squares = 0;
+  int white = 0;          // pixels that stand at white
   double rs = 0, ss = 0;  // residual times slope across the outline, slope squared
   double rms() const { return n > 0 ? std::sqrt(squares / n) : 0; }
   double displacement_px() const { return ss > 0 ? rs / ss : 0; }
@@ -76,6 +78,7 @@ Residuals residuals_of(const EllipseBand& band, const Shape& shape, OutlineSecto
     const int k = sector_of(x.x(), x.y());
     Sector& sector = result.sector[std::size_t(k)];
     ++sector.n;
+    sector.white += band.grey[i] > brightest_grey ? 1 : 0;
     sector.squares += at.residual * at.residual;
     sector.rs += at.residual * at.slope;
     sector.ss += at.slope * at.slope;
@@ -100,7 +103,7 @@ double noise_of(const Residuals& residuals, OutlineSectors hidden) {
 }
 
 bool fits(const Sector& sector, double noise, double model_grey) {
-  if (!(sector.n > 0) || !(sector.ss > 0)) return false;
+  if (!(sector.n > 0) || !(sector.ss > 0) || sector.white > 0) return false;
   const double allowed2 = noise * noise * (1 + 4 * std::sqrt(2 / sector.n)) + model_grey * model_grey;
   const double sigma_px = noise / std::sqrt(sector.ss);
   return sector.squares / sector.n < allowed2 &&

@@ -38,9 +38,10 @@ bool stands(const MarkFinding& finding) {
   return finding.status == MarkStatus::found || finding.status == MarkStatus::saturated;
 }
 
-// The same thing, taken up twice from different grey levels.
+// The same thing, taken up twice from different grey levels, or once with its glint and once without.
 bool same_place(const MarkFinding& a, const MarkFinding& b) {
-  return (a.u_px - b.u_px).norm() < 0.5 && std::abs(a.diameter_px - b.diameter_px) < 1;
+  const double room = a.status == b.status ? 0.5 : 0.5 + 0.1 * a.diameter_px;
+  return (a.u_px - b.u_px).norm() < room && std::abs(a.diameter_px - b.diameter_px) < 2 * room;
 }
 
 void take(const MarkFinding& finding, DiscSight& sight) {
@@ -48,8 +49,11 @@ void take(const MarkFinding& finding, DiscSight& sight) {
     if (telling(finding.status) >= telling(sight.nearest.status)) sight.nearest = finding;
     return;
   }
-  for (const MarkFinding& known : sight.standing)
-    if (same_place(known, finding)) return;
+  for (MarkFinding& known : sight.standing) {
+    if (!same_place(known, finding)) continue;
+    if (known.status == MarkStatus::saturated) known = finding;
+    return;
+  }
   const auto behind =
       std::find_if(sight.standing.begin(), sight.standing.end(),
                    [&](const MarkFinding& known) { return known.contrast < finding.contrast; });
@@ -57,11 +61,11 @@ void take(const MarkFinding& finding, DiscSight& sight) {
 }
 
 DiscSight sight_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
-                   EllipseWorkspace& workspace) {
+                   MarkWorkspace& workspace) {
   DiscSight sight;
   sight.nearest.status = seen.reason;
   for (std::size_t k = 0; k < std::min(most_candidates, seen.candidates.size()); ++k)
-    take(fit_mark(image, search, seen.candidates[k].start, workspace), sight);
+    take(fit_mark(image, search, seen.candidates[k].start, workspace.ellipse, workspace.tolerance), sight);
   return sight;
 }
 
@@ -77,7 +81,7 @@ DiscSight look_at_regions(const ImageView& image, const MarkSearch& search,
                           std::optional<CandidateSearch> seen, MarkWorkspace& workspace) {
   DiscSight sight;
   while (seen) {
-    sight = sight_of(image, search, *seen, workspace.ellipse);
+    sight = sight_of(image, search, *seen, workspace);
     if (decided(sight, *seen)) break;
     seen = workspace.candidates.finer(image, search);
   }
@@ -115,7 +119,7 @@ bool filled(const ImageView& image, const MarkSearch& search, const EllipseStart
 }
 
 void look_at_outlines(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                      EllipseWorkspace& workspace, DiscSight& sight) {
+                      MarkWorkspace& workspace, DiscSight& sight) {
   for (const CoveredOutline& outline : covered_outlines(image, window, search)) {
     EllipseStart start = outline.start;
     const double rim = std::max(0.0, 1 - 2.5 / half_axes(start.shape_px2).minor_px);
@@ -123,12 +127,18 @@ void look_at_outlines(const ImageView& image, const PixelWindow& window, const M
     start.background_grey = grey_at_share(image, start, 2 - rim);
     const double contrast = (start.background_grey - start.mark_grey) * (search.bright ? -1 : 1);
     if (!(contrast > 0.5 * search.min_contrast) || !filled(image, search, start)) continue;
-    const MarkFinding finding = fit_covered_mark(image, search, start, workspace);
+    const MarkFinding finding =
+        fit_covered_mark(image, search, start, workspace.ellipse, workspace.tolerance);
     if (finding.status != MarkStatus::not_converged) take(finding, sight);
   }
 }
 
 }  // namespace
+
+bool DiscSight::found() const {
+  return std::any_of(standing.begin(), standing.end(),
+                     [](const MarkFinding& finding) { return finding.status == MarkStatus::found; });
+}
 
 MarkFinding DiscSight::only() const {
   if (standing.empty()) return nearest;
@@ -141,15 +151,17 @@ MarkFinding DiscSight::only() const {
 DiscSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
                          MarkWorkspace& workspace) {
   CandidateFinder& finder = workspace.candidates;
+  workspace.tolerance.noise_grey =
+      2 * noise_grey(image, window) + 0.5;  // shot noise: more where it is bright
   DiscSight sight = look_at_regions(image, search, finder.first(image, window, search), workspace);
-  if (!sight.standing.empty()) return sight;
+  if (sight.found()) return sight;
   if (auto seen = finder.flattened(image, search)) {
     DiscSight flat = look_at_regions(image, search, std::move(seen), workspace);
     if (telling(flat.nearest.status) < telling(sight.nearest.status)) flat.nearest = sight.nearest;
     sight = std::move(flat);
-    if (!sight.standing.empty()) return sight;
+    if (sight.found()) return sight;
   }
-  look_at_outlines(image, window, search, workspace.ellipse, sight);
+  look_at_outlines(image, window, search, workspace, sight);
   return sight;
 }
 

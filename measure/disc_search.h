@@ -5,6 +5,7 @@
 
 #include "measure/ellipse_fit.h"
 #include "measure/mark_candidates.h"
+#include "measure/mark_fit.h"
 #include "measure/marks.h"
 
 namespace zeropose {
@@ -13,12 +14,14 @@ namespace zeropose {
 struct MarkWorkspace {
   CandidateFinder candidates;
   EllipseWorkspace ellipse;
+  FitTolerance tolerance;
 };
 
 struct DiscSight {
   std::vector<MarkFinding> standing;  // found, or would be if they were not saturated; best contrast first
   MarkFinding nearest;                // what came nearest to one where none stands
 
+  bool found() const;
   // The one mark of the window, ambiguous where a second one stands beside it.
   MarkFinding only() const;
 };

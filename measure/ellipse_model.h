@@ -15,7 +15,7 @@ using Unknowns = Eigen::Matrix<double, unknowns, 1>;
 using Information = Eigen::Matrix<double, unknowns, unknowns>;
 
 // Limits of what counts as an edge's blur.
-inline constexpr double smallest_blur_px = 0.25, largest_blur_px = 4;
+inline constexpr double smallest_blur_px = 0.25, largest_blur_px = 6;
 
 // cu cv relative to the band's origin; P = R^2 times the inverse shape, so that its elements are near 1.
 struct State {

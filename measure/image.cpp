@@ -1,5 +1,9 @@
 #include "measure/image.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
 namespace zeropose {
 namespace {
 
@@ -13,7 +17,33 @@ void copy_rows(const ImageView& image, const PixelWindow& window, float* __restr
   }
 }
 
+template <typename Pixel>
+int median_bend(const ImageView& image, const PixelWindow& window) {
+  constexpr int most_samples = 4000;
+  const int rows = std::max(1, most_samples / window.width());
+  const int stride = std::max(1, window.height() / rows);
+  std::vector<int> bends;
+  for (int v = window.v0; v <= window.v1; v += stride) {
+    const Pixel* row = image.row<Pixel>(v);
+    for (int u = window.u0 + 1; u < window.u1; ++u)
+      bends.push_back(std::abs(row[u - 1] - 2 * row[u] + row[u + 1]));
+  }
+  if (bends.empty()) return 0;
+  const auto middle = bends.begin() + std::ptrdiff_t(bends.size() / 2);
+  std::nth_element(bends.begin(), middle, bends.end());
+  return *middle;
+}
+
 }  // namespace
+
+double noise_grey(const ImageView& image, const PixelWindow& window) {
+  const double rounding = image.grey_per_count() / std::sqrt(12.0);
+  if (window.empty()) return rounding;
+  const int bend = image.two_bytes() ? median_bend<std::uint16_t>(image, window)
+                                     : median_bend<std::uint8_t>(image, window);
+  // The median of |a - 2 b + c| is 0.6745 times its standard deviation, that is sqrt(6) times the noise.
+  return std::max(rounding, image.grey_per_count() * bend / (0.6745 * std::sqrt(6.0)));
+}
 
 void copy_greys(const ImageView& image, const PixelWindow& window, std::vector<float>& greys) {
   greys.clear();

@@ -41,4 +41,8 @@ struct ImageView {
 // The grey levels of a window, row by row. Precondition: the window lies in the image.
 void copy_greys(const ImageView& image, const PixelWindow& window, std::vector<float>& greys);
 
+// Standard deviation of the noise, grey levels, from second differences along some rows: their median, so
+// that edges do not count as long as most of the window is flat. Never below that of the camera's own steps.
+double noise_grey(const ImageView& image, const PixelWindow& window);
+
 }  // namespace zeropose

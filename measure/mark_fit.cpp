@@ -12,8 +12,7 @@ constexpr double noise_sigmas = 4;        // how far two variances of the same n
 constexpr double rough_px = 0.15;         // what the outline of a real mark may deviate from an ellipse, rms
 constexpr double most_noise_share = 0.3;  // of the contrast
 constexpr double saturated_share = 0.02;  // of the pixels across the outline
-constexpr double least_outline_share = 0.6;
-constexpr int most_gaps = 4;
+constexpr double clear_contrast = 20;     // in units of the noise: shows well what is no ellipse
 
 bool band_in_image(const ImageView& image, const EllipseStart& start) {
   const double u = std::sqrt(start.shape_px2(0, 0)) + start.band_px + 0.5;
@@ -36,16 +35,16 @@ MarkFinding finding_of(const EllipseFit& fit) {
   finding.outline_share = 1;
   const double noise = fit.flat_rms > 0 ? fit.flat_rms : 0.02 * finding.contrast;
   const double excess = std::max(0.0, fit.edge_rms * fit.edge_rms - noise * noise);
-  const double allowed = plain_model_share * finding.contrast;
+  const double allowed = FitTolerance{}.model_share * finding.contrast;
   finding.quality = 1 / (1 + excess / (allowed * allowed));
   return finding;
 }
 
 // Residuals across the outline: noise as in the flat rings, and a small share of the contrast.
-bool explains(const EllipseFit& fit, const MarkFinding& finding, double model_share) {
-  const double noise = std::min(fit.flat_rms, most_noise_share * finding.contrast);
+bool explains(const EllipseFit& fit, const MarkFinding& finding, const FitTolerance& tolerance) {
+  const double noise = std::min({fit.flat_rms, most_noise_share * finding.contrast, tolerance.noise_grey});
   const double spread = std::sqrt(2 / fit.edge_count + 2 / std::max(1.0, fit.flat_count));
-  const double model = model_share * finding.contrast;
+  const double model = tolerance.model_share * finding.contrast;
   const double allowed2 = noise * noise * (1 + noise_sigmas * spread) + model * model;
   const double outline2 = 2.5 * fit.outline_noise_px * fit.outline_noise_px + rough_px * rough_px;
   return fit.edge_rms * fit.edge_rms < allowed2 && fit.outline_px * fit.outline_px < outline2;
@@ -79,27 +78,28 @@ MarkFinding failed(MarkStatus status) {
 }  // namespace
 
 MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
-                     EllipseWorkspace& workspace, double model_share) {
+                     EllipseWorkspace& workspace, const FitTolerance& tolerance) {
   if (!band_in_image(image, start)) return failed(MarkStatus::cut_off);
   const EllipseFit fit = fit_ellipse(image, start, workspace);
   if (!fit.converged) return failed(MarkStatus::not_converged);
   MarkFinding finding = finding_of(fit);
   finding.status =
-      status_of(fit, finding, search, explains(fit, finding, model_share) && in_place(fit, start, 0.05));
+      status_of(fit, finding, search, explains(fit, finding, tolerance) && in_place(fit, start, 0.05));
   return finding;
 }
 
 MarkFinding fit_covered_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
-                             EllipseWorkspace& workspace) {
+                             EllipseWorkspace& workspace, const FitTolerance& tolerance) {
   if (!band_in_image(image, start)) return failed(MarkStatus::cut_off);
-  const CoveredFit covered = fit_covered_ellipse(image, start, plain_model_share, workspace);
+  const CoveredFit covered = fit_covered_ellipse(image, start, tolerance.model_share, workspace);
   if (!covered.fit.converged) return failed(MarkStatus::not_converged);
   MarkFinding finding = finding_of(covered.fit);
   finding.outline_share = covered.outline_share;
   finding.quality *= covered.outline_share;
-  const bool explained = covered.outline_share >= least_outline_share && covered.gaps <= most_gaps &&
-                         covered.waves_px < rough_px && explains(covered.fit, finding, plain_model_share) &&
-                         in_place(covered.fit, start, 0.2);
+  const bool clear = finding.contrast > clear_contrast * covered.noise_grey;
+  const bool explained = covered.outline_share >= (clear ? 0.5 : 0.6) && covered.gaps <= (clear ? 8 : 4) &&
+                         covered.waves_px < rough_px && covered.noise_grey < tolerance.noise_grey &&
+                         explains(covered.fit, finding, tolerance) && in_place(covered.fit, start, 0.2);
   finding.status = status_of(covered.fit, finding, search, explained);
   return finding;
 }

@@ -2,26 +2,34 @@
 // board share.
 #pragma once
 
+#include <limits>
+
 #include "measure/ellipse_fit.h"
 #include "measure/image.h"
 #include "measure/marks.h"
 
 namespace zeropose {
 
-// Of the contrast: how far the grey levels across the outline may be from the model, rms. Sharpening in the
-// camera and compressed pictures go beyond what plain optics leave; both sides of a disc alike, so that its
-// centre stays.
-inline constexpr double plain_model_share = 0.04, sharpened_model_share = 0.1;
+// What the pixels may differ from the model and still count as explained.
+struct FitTolerance {
+  // Of the contrast, rms across the outline. Sharpening in the camera and compressed pictures go beyond what
+  // plain optics leave; both sides of a disc alike, so that its centre stays.
+  double model_share = 0.04;
+  // Grey levels: what the image's own noise may be at most, wherever the flat surroundings show more than
+  // that.
+  double noise_grey = std::numeric_limits<double>::infinity();
+};
+inline constexpr double sharpened_model_share = 0.1;
 
 // The mark at the start's outline, or why it is none (the numbers are then of no use). Of the search the
 // kind, the limits of size and shape and the least contrast count; the window does not. Precondition: image
 // of at least 2 x 2 px.
 MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
-                     EllipseWorkspace& workspace, double model_share = plain_model_share);
+                     EllipseWorkspace& workspace, const FitTolerance& tolerance = {});
 
 // The same where the outline is spoilt in places: at least 0.6 of it must agree on one ellipse, the rest lie
-// in at most four stretches.
+// in at most four stretches; half of it and eight where the contrast is above twenty times the noise.
 MarkFinding fit_covered_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
-                             EllipseWorkspace& workspace);
+                             EllipseWorkspace& workspace, const FitTolerance& tolerance = {});
 
 }  // namespace zeropose

@@ -37,7 +37,7 @@ struct MarkSearch {
          max_diameter_px = 0;   // the longer axis of the outline; cross: of its arms' span
   double min_axis_ratio = 0.3;  // shorter / longer axis; slot: width / length
   double min_contrast = 15;     // grey levels
-  double max_blur_px = 3;       // sigma of the edges
+  double max_blur_px = 4;       // sigma of the edges
   std::vector<double>
       inner_shares{};  // ring: radii of its inner circles by that of the outer one, descending
   // Slot: its longer axis. Cross: one of its bars. Corner: the middle of the angle, from the corner into the

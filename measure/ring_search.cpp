@@ -36,7 +36,7 @@ double band_of(const std::vector<double>& shares, std::size_t k, double minor_px
 
 // The circles from the outer one inwards, as far as they are there.
 std::vector<MarkFinding> circles_round(const ImageView& image, const MarkSearch& search,
-                                       const MarkFinding& inner, EllipseWorkspace& workspace) {
+                                       const MarkFinding& inner, MarkWorkspace& workspace) {
   std::vector<double> shares{1};
   shares.insert(shares.end(), search.inner_shares.begin(), search.inner_shares.end());
   std::vector<MarkFinding> circles;
@@ -53,9 +53,11 @@ std::vector<MarkFinding> circles_round(const ImageView& image, const MarkSearch&
     circle.max_diameter_px = (1 + size_tolerance) * scale * inner.diameter_px;
     start.mark_grey = circle.bright ? 200 : 50;
     start.background_grey = circle.bright ? 50 : 200;
-    circles.push_back(k + 1 == shares.size() ? inner : fit_mark(image, circle, start, workspace));
+    circles.push_back(k + 1 == shares.size()
+                          ? inner
+                          : fit_mark(image, circle, start, workspace.ellipse, workspace.tolerance));
     if (circles.back().status == MarkStatus::not_converged)
-      circles.back() = fit_covered_mark(image, circle, start, workspace);
+      circles.back() = fit_covered_mark(image, circle, start, workspace.ellipse, workspace.tolerance);
     if (circles.back().status != MarkStatus::found) break;
   }
   return circles;
@@ -86,7 +88,7 @@ MarkFinding joined(const std::vector<MarkFinding>& circles) {
 }
 
 MarkFinding ring_about(const ImageView& image, const MarkSearch& search, const MarkFinding& inner,
-                       EllipseWorkspace& workspace) {
+                       MarkWorkspace& workspace) {
   const std::vector<MarkFinding> circles = circles_round(image, search, inner, workspace);
   MarkFinding ring = circles.front();
   if (circles.back().status != MarkStatus::found) {
@@ -111,7 +113,7 @@ MarkFinding find_ring(const ImageView& image, const PixelWindow& window, const M
   MarkFinding best = sight.nearest;
   int rings = 0;
   for (const MarkFinding& inner : sight.standing) {
-    const MarkFinding ring = ring_about(image, search, inner, workspace.ellipse);
+    const MarkFinding ring = ring_about(image, search, inner, workspace);
     if (rings == 0) best = ring;
     rings += ring.status == MarkStatus::found ? 1 : 0;
   }

@@ -185,9 +185,9 @@ TEST(MarkReasons, CarryTheNumbers) {
   drawing.figures = {ellipse(middle, 44, 1, 0, 158)};
   EXPECT_EQ(reason(drawing).first, MarkStatus::low_contrast) << reason(drawing).second;
   drawing.figures = {ellipse(middle, 44, 1, 0, 70)};
-  drawing.blur_sigma_px = 3.4;
+  drawing.blur_sigma_px = 4.4;
   EXPECT_EQ(reason(drawing).first, MarkStatus::blurred) << reason(drawing).second;
-  EXPECT_NE(reason(drawing).second.find("at most 3.00 px"), std::string::npos) << reason(drawing).second;
+  EXPECT_NE(reason(drawing).second.find("at most 4.00 px"), std::string::npos) << reason(drawing).second;
   drawing.blur_sigma_px = 0.7;
   drawing.figures = {ellipse(middle - Vector2d(27, 0), 40, 1, 0, 70),
                      ellipse(middle + Vector2d(27, 0), 40, 1, 0, 70)};
