@@ -12,6 +12,7 @@ constexpr double noise_sigmas = 4;        // how far two variances of the same n
 constexpr double rough_px = 0.15;         // what the outline of a real mark may deviate from an ellipse, rms
 constexpr double most_noise_share = 0.3;  // of the contrast
 constexpr double saturated_share = 0.02;  // of the pixels across the outline
+constexpr double plain_model_share = 0.04;  // what plain optics leave
 constexpr double clear_contrast = 20;     // in units of the noise: shows well what is no ellipse
 
 bool band_in_image(const ImageView& image, const EllipseStart& start) {
@@ -35,7 +36,7 @@ MarkFinding finding_of(const EllipseFit& fit) {
   finding.outline_share = 1;
   const double noise = fit.flat_rms > 0 ? fit.flat_rms : 0.02 * finding.contrast;
   const double excess = std::max(0.0, fit.edge_rms * fit.edge_rms - noise * noise);
-  const double allowed = FitTolerance{}.model_share * finding.contrast;
+  const double allowed = plain_model_share * finding.contrast;
   finding.quality = 1 / (1 + excess / (allowed * allowed));
   return finding;
 }
@@ -91,7 +92,7 @@ MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const Ell
 MarkFinding fit_covered_mark(const ImageView& image, const MarkSearch& search, const EllipseStart& start,
                              EllipseWorkspace& workspace, const FitTolerance& tolerance) {
   if (!band_in_image(image, start)) return failed(MarkStatus::cut_off);
-  const CoveredFit covered = fit_covered_ellipse(image, start, tolerance.model_share, workspace);
+  const CoveredFit covered = fit_covered_ellipse(image, start, plain_model_share, workspace);
   if (!covered.fit.converged) return failed(MarkStatus::not_converged);
   MarkFinding finding = finding_of(covered.fit);
   finding.outline_share = covered.outline_share;

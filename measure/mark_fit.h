@@ -14,7 +14,7 @@ namespace zeropose {
 struct FitTolerance {
   // Of the contrast, rms across the outline. Sharpening in the camera and compressed pictures go beyond what
   // plain optics leave; both sides of a disc alike, so that its centre stays.
-  double model_share = 0.04;
+  double model_share = 0.1;
   // Grey levels: what the image's own noise may be at most, wherever the flat surroundings show more than
   // that.
   double noise_grey = std::numeric_limits<double>::infinity();
