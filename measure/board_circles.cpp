@@ -62,8 +62,7 @@ void fit_all(const ImageView& image, const MarkSearch& search, const CandidateSe
   for (std::size_t k = 0; k < std::min(most_fits, seen.candidates.size()); ++k) {
     const EllipseStart& start = seen.candidates[k].start;
     if (known(discs.found, start.centre_px)) continue;
-    const MarkFinding finding =
-        fit_mark(image, search, start, workspace, {.model_share = sharpened_model_share});
+    const MarkFinding finding = fit_mark(image, search, start, workspace);
     discs.saturated += finding.status == MarkStatus::saturated ? 1 : 0;
     discs.cut_off += finding.status == MarkStatus::cut_off ? 1 : 0;
     if (finding.status == MarkStatus::found && !known(discs.found, finding.u_px))

@@ -14,6 +14,8 @@ namespace zeropose {
 namespace {
 
 constexpr std::size_t most_candidates = 8;  // fits per window and look
+constexpr std::size_t most_of_all = 4000;   // where all are wanted
+constexpr double widest_covered = 12;       // a window in units of the mark: where outlines are put together
 constexpr double rival_contrast = 0.4;      // of the best one's: then it is a rival
 
 // How near to a found mark a failed one came.
@@ -44,7 +46,7 @@ bool same_place(const MarkFinding& a, const MarkFinding& b) {
   return (a.u_px - b.u_px).norm() < room && std::abs(a.diameter_px - b.diameter_px) < 2 * room;
 }
 
-void take(const MarkFinding& finding, DiscSight& sight) {
+void take(const MarkFinding& finding, MarkSight& sight) {
   if (!stands(finding)) {
     if (telling(finding.status) >= telling(sight.nearest.status)) sight.nearest = finding;
     return;
@@ -60,32 +62,49 @@ void take(const MarkFinding& finding, DiscSight& sight) {
   sight.standing.insert(behind, finding);
 }
 
-DiscSight sight_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
-                   MarkWorkspace& workspace) {
-  DiscSight sight;
+MarkSight sight_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
+                   std::size_t most, MarkWorkspace& workspace) {
+  MarkSight sight;
   sight.nearest.status = seen.reason;
-  for (std::size_t k = 0; k < std::min(most_candidates, seen.candidates.size()); ++k)
+  for (std::size_t k = 0; k < std::min(most, seen.candidates.size()); ++k)
     take(fit_mark(image, search, seen.candidates[k].start, workspace.ellipse, workspace.tolerance), sight);
   return sight;
 }
 
 // Levels so far apart that a rival could slip through call for a closer look.
-bool decided(const DiscSight& sight, const CandidateSearch& seen) {
+bool decided(const MarkSight& sight, const CandidateSearch& seen) {
   const MarkFinding best = sight.only();
   return best.status == MarkStatus::ambiguous ||
          (stands(best) && seen.step_grey < 0.75 * rival_contrast * best.contrast);
 }
 
-// At finer and finer grey levels.
-DiscSight look_at_regions(const ImageView& image, const MarkSearch& search,
-                          std::optional<CandidateSearch> seen, MarkWorkspace& workspace) {
-  DiscSight sight;
+// At finer and finer grey levels until it is sure which one it is.
+MarkSight look_for_one(const ImageView& image, const MarkSearch& search, std::optional<CandidateSearch> seen,
+                       MarkWorkspace& workspace) {
+  MarkSight sight;
   while (seen) {
-    sight = sight_of(image, search, *seen, workspace);
+    sight = sight_of(image, search, *seen, most_candidates, workspace);
     if (decided(sight, *seen)) break;
     seen = workspace.candidates.finer(image, search);
   }
   return sight;
+}
+
+// At grey levels so fine that the least contrast does not slip through.
+MarkSight look_for_all(const ImageView& image, const MarkSearch& search, CandidateSearch seen,
+                       MarkWorkspace& workspace) {
+  while (!(seen.step_grey < 0.75 * search.min_contrast)) {
+    auto finer = workspace.candidates.finer(image, search);
+    if (!finer) break;
+    seen = std::move(*finer);
+  }
+  return sight_of(image, search, seen, most_of_all, workspace);
+}
+
+MarkSight look_at_regions(const ImageView& image, const MarkSearch& search, CandidateSearch seen,
+                          HowMany wanted, MarkWorkspace& workspace) {
+  return wanted == HowMany::all ? look_for_all(image, search, std::move(seen), workspace)
+                                : look_for_one(image, search, std::move(seen), workspace);
 }
 
 double grey_near(const ImageView& image, const Eigen::Vector2d& at) {
@@ -119,7 +138,7 @@ bool filled(const ImageView& image, const MarkSearch& search, const EllipseStart
 }
 
 void look_at_outlines(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                      MarkWorkspace& workspace, DiscSight& sight) {
+                      MarkWorkspace& workspace, MarkSight& sight) {
   for (const CoveredOutline& outline : covered_outlines(image, window, search)) {
     EllipseStart start = outline.start;
     const double rim = std::max(0.0, 1 - 2.5 / half_axes(start.shape_px2).minor_px);
@@ -135,12 +154,12 @@ void look_at_outlines(const ImageView& image, const PixelWindow& window, const M
 
 }  // namespace
 
-bool DiscSight::found() const {
+bool MarkSight::found() const {
   return std::any_of(standing.begin(), standing.end(),
                      [](const MarkFinding& finding) { return finding.status == MarkStatus::found; });
 }
 
-MarkFinding DiscSight::only() const {
+MarkFinding MarkSight::only() const {
   if (standing.empty()) return nearest;
   MarkFinding best = standing.front();
   const bool rival = standing.size() > 1 && standing[1].contrast > rival_contrast * best.contrast;
@@ -148,20 +167,21 @@ MarkFinding DiscSight::only() const {
   return best;
 }
 
-DiscSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                         MarkWorkspace& workspace) {
+MarkSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                         HowMany wanted, MarkWorkspace& workspace) {
   CandidateFinder& finder = workspace.candidates;
   workspace.tolerance.noise_grey =
       2 * noise_grey(image, window) + 0.5;  // shot noise: more where it is bright
-  DiscSight sight = look_at_regions(image, search, finder.first(image, window, search), workspace);
+  MarkSight sight = look_at_regions(image, search, finder.first(image, window, search), wanted, workspace);
   if (sight.found()) return sight;
   if (auto seen = finder.flattened(image, search)) {
-    DiscSight flat = look_at_regions(image, search, std::move(seen), workspace);
+    MarkSight flat = look_at_regions(image, search, *std::move(seen), wanted, workspace);
     if (telling(flat.nearest.status) < telling(sight.nearest.status)) flat.nearest = sight.nearest;
     sight = std::move(flat);
     if (sight.found()) return sight;
   }
-  look_at_outlines(image, window, search, workspace, sight);
+  if (std::max(window.width(), window.height()) <= widest_covered * search.max_diameter_px)
+    look_at_outlines(image, window, search, workspace, sight);
   return sight;
 }
 

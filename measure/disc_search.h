@@ -17,7 +17,7 @@ struct MarkWorkspace {
   FitTolerance tolerance;
 };
 
-struct DiscSight {
+struct MarkSight {
   std::vector<MarkFinding> standing;  // found, or would be if they were not saturated; best contrast first
   MarkFinding nearest;                // what came nearest to one where none stands
 
@@ -26,9 +26,15 @@ struct DiscSight {
   MarkFinding only() const;
 };
 
-// First as regions at grey levels; where that finds none, without the light's falling off, and then by their
-// outline, of which parts may be covered. Precondition: the search makes sense and its window is not empty.
-DiscSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                         MarkWorkspace& workspace);
+enum class HowMany {
+  one,  // looks until it is sure which one is the mark, or that several are
+  all   // looks for all, of the least contrast too
+};
+
+// First as regions at grey levels; where that finds none, without the light's falling off, and then, in a
+// window of at most twelve times the mark, by their outline, of which parts may be covered. Precondition: the
+// search makes sense and its window is not empty.
+MarkSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                         HowMany wanted, MarkWorkspace& workspace);
 
 }  // namespace zeropose

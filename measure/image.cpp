@@ -1,6 +1,7 @@
 #include "measure/image.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 
@@ -17,17 +18,31 @@ void copy_rows(const ImageView& image, const PixelWindow& window, float* __restr
   }
 }
 
-template <typename Pixel>
-int median_bend(const ImageView& image, const PixelWindow& window) {
-  constexpr int most_samples = 4000;
-  const int rows = std::max(1, most_samples / window.width());
-  const int stride = std::max(1, window.height() / rows);
-  std::vector<int> bends;
+// Every few rows, so that there are about 1500.
+template <typename Pixel, typename Take>
+int take_bends(const ImageView& image, const PixelWindow& window, const Take& take) {
+  const int rows = std::max(1, 1500 / window.width()), stride = std::max(1, window.height() / rows);
+  int count = 0;
   for (int v = window.v0; v <= window.v1; v += stride) {
     const Pixel* row = image.row<Pixel>(v);
-    for (int u = window.u0 + 1; u < window.u1; ++u)
-      bends.push_back(std::abs(row[u - 1] - 2 * row[u] + row[u + 1]));
+    for (int u = window.u0 + 1; u < window.u1; ++u) take(std::abs(row[u - 1] - 2 * row[u] + row[u + 1]));
+    count += std::max(0, window.width() - 2);
   }
+  return count;
+}
+
+int median_bend_of_bytes(const ImageView& image, const PixelWindow& window) {
+  std::array<int, 511> histogram{};
+  const int count =
+      take_bends<std::uint8_t>(image, window, [&](int bend) { ++histogram[static_cast<std::size_t>(bend)]; });
+  int middle = 0;
+  for (int sum = histogram[0]; 2 * sum < count && middle < 510;) sum += histogram[std::size_t(++middle)];
+  return middle;
+}
+
+int median_bend_of_words(const ImageView& image, const PixelWindow& window) {
+  std::vector<int> bends;
+  take_bends<std::uint16_t>(image, window, [&](int bend) { bends.push_back(bend); });
   if (bends.empty()) return 0;
   const auto middle = bends.begin() + std::ptrdiff_t(bends.size() / 2);
   std::nth_element(bends.begin(), middle, bends.end());
@@ -39,8 +54,8 @@ int median_bend(const ImageView& image, const PixelWindow& window) {
 double noise_grey(const ImageView& image, const PixelWindow& window) {
   const double rounding = image.grey_per_count() / std::sqrt(12.0);
   if (window.empty()) return rounding;
-  const int bend = image.two_bytes() ? median_bend<std::uint16_t>(image, window)
-                                     : median_bend<std::uint8_t>(image, window);
+  const int bend =
+      image.two_bytes() ? median_bend_of_words(image, window) : median_bend_of_bytes(image, window);
   // The median of |a - 2 b + c| is 0.6745 times its standard deviation, that is sqrt(6) times the noise.
   return std::max(rounding, image.grey_per_count() * bend / (0.6745 * std::sqrt(6.0)));
 }

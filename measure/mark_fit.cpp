@@ -13,7 +13,7 @@ constexpr double rough_px = 0.15;         // what the outline of a real mark may
 constexpr double most_noise_share = 0.3;  // of the contrast
 constexpr double saturated_share = 0.02;  // of the pixels across the outline
 constexpr double plain_model_share = 0.04;  // what plain optics leave
-constexpr double clear_contrast = 20;     // in units of the noise: shows well what is no ellipse
+constexpr double clear_contrast = 20;       // in units of the noise: shows well what is no ellipse
 
 bool band_in_image(const ImageView& image, const EllipseStart& start) {
   const double u = std::sqrt(start.shape_px2(0, 0)) + start.band_px + 0.5;

@@ -12,14 +12,13 @@ namespace zeropose {
 
 // What the pixels may differ from the model and still count as explained.
 struct FitTolerance {
-  // Of the contrast, rms across the outline. Sharpening in the camera and compressed pictures go beyond what
-  // plain optics leave; both sides of a disc alike, so that its centre stays.
+  // Of the contrast, rms across the outline. Plain optics leave 0.04; sharpening in the camera and
+  // compression go beyond, on both sides of a disc alike, so that its centre stays.
   double model_share = 0.1;
   // Grey levels: what the image's own noise may be at most, wherever the flat surroundings show more than
   // that.
   double noise_grey = std::numeric_limits<double>::infinity();
 };
-inline constexpr double sharpened_model_share = 0.1;
 
 // The mark at the start's outline, or why it is none (the numbers are then of no use). Of the search the
 // kind, the limits of size and shape and the least contrast count; the window does not. Precondition: image

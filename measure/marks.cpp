@@ -41,16 +41,17 @@ MarkFinding with_status(MarkStatus status) {
   return finding;
 }
 
-MarkFinding find_mark(const ImageView& image, const MarkSearch& search, MarkWorkspace& workspace) {
+MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wanted,
+                   MarkWorkspace& workspace) {
   if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
-    return with_status(status);
+    return {{}, with_status(status)};
   const PixelWindow window = window_of(image, search);
   switch (search.kind) {
     case MarkKind::disc:
     case MarkKind::ball:
-      return look_for_discs(image, window, search, workspace).only();
+      return look_for_discs(image, window, search, wanted, workspace);
     case MarkKind::ring:
-      return find_ring(image, window, search, workspace);
+      return look_for_rings(image, window, search, wanted, workspace);
     case MarkKind::slot:
     case MarkKind::cross:
     case MarkKind::corner:
@@ -75,27 +76,16 @@ std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const Mark
   std::vector<MarkFinding> findings;
   findings.reserve(searches.size());
   MarkWorkspace workspace;
-  for (const MarkSearch& search : searches) findings.push_back(find_mark(image, search, workspace));
+  for (const MarkSearch& search : searches)
+    findings.push_back(look_for(image, search, HowMany::one, workspace).only());
   return findings;
 }
 
-std::vector<std::vector<MarkFinding>> find_mark_candidates(const ImageView& image,
-                                                           std::span<const MarkSearch> searches) {
-  std::vector<std::vector<MarkFinding>> all;
+AllMarks find_all_marks(const ImageView& image, const MarkSearch& search) {
   MarkWorkspace workspace;
-  for (const MarkSearch& search : searches) {
-    std::vector<MarkFinding>& found = all.emplace_back();
-    const bool disc = search.kind == MarkKind::disc || search.kind == MarkKind::ball;
-    if (const MarkStatus status = first_look(image, search); status != MarkStatus::found) continue;
-    if (disc) {
-      for (MarkFinding& finding : look_for_discs(image, window_of(image, search), search, workspace).standing)
-        if (finding.status == MarkStatus::found) found.push_back(std::move(finding));
-    } else if (MarkFinding finding = find_mark(image, search, workspace);
-               finding.status == MarkStatus::found) {
-      found.push_back(std::move(finding));
-    }
-  }
-  return all;
+  MarkSight sight = look_for(image, search, HowMany::all, workspace);
+  std::erase_if(sight.standing, [](const MarkFinding& mark) { return mark.status != MarkStatus::found; });
+  return {std::move(sight.standing), sight.nearest};
 }
 
 }  // namespace zeropose

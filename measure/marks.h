@@ -92,10 +92,13 @@ struct MarkFinding {
 // mark at 0 is measured.
 std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const MarkSearch> searches);
 
-// All things in the window of each search that pass for its mark, the highest contrast first: for the
-// geometry of several marks to choose from. Empty where find_marks() would not say found or ambiguous.
-std::vector<std::vector<MarkFinding>> find_mark_candidates(const ImageView& image,
-                                                           std::span<const MarkSearch> searches);
+// All things in a window that pass for the mark, the highest contrast first: where several are wanted, or the
+// geometry of several marks is to choose. nearest: what came nearest where there is none.
+struct AllMarks {
+  std::vector<MarkFinding> found;
+  MarkFinding nearest;
+};
+AllMarks find_all_marks(const ImageView& image, const MarkSearch& search);
 
 // Why it was not found, with the numbers and the limit they miss, for people.
 std::string reason_text(const MarkFinding& finding, const MarkSearch& search);

@@ -182,7 +182,7 @@ std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, con
     for (std::size_t k = 0; k < views.size(); ++k) {
       findings[views[k]] = found[k];
       if (found[k].status == MarkStatus::ambiguous)
-        candidates[views[k]] = find_mark_candidates(image.image, {&searches[k], 1}).front();
+        candidates[views[k]] = find_all_marks(image.image, searches[k]).found;
     }
   }
   return decided_by_geometry(job, cameras, std::move(findings), candidates, X_WO_expected);

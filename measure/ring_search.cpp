@@ -107,18 +107,20 @@ MarkFinding ring_about(const ImageView& image, const MarkSearch& search, const M
 
 }  // namespace
 
-MarkFinding find_ring(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                      MarkWorkspace& workspace) {
-  const DiscSight sight = look_for_discs(image, window, innermost(search), workspace);
-  MarkFinding best = sight.nearest;
-  int rings = 0;
-  for (const MarkFinding& inner : sight.standing) {
-    const MarkFinding ring = ring_about(image, search, inner, workspace);
-    if (rings == 0) best = ring;
-    rings += ring.status == MarkStatus::found ? 1 : 0;
+MarkSight look_for_rings(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                         HowMany wanted, MarkWorkspace& workspace) {
+  const MarkSight inner = look_for_discs(image, window, innermost(search), wanted, workspace);
+  MarkSight rings;
+  rings.nearest = inner.nearest;
+  for (const MarkFinding& disc : inner.standing) {
+    const MarkFinding ring = ring_about(image, search, disc, workspace);
+    if (ring.status == MarkStatus::found) {
+      rings.standing.push_back(ring);
+    } else {
+      rings.nearest = ring;
+    }
   }
-  if (rings > 1) best.status = MarkStatus::ambiguous;
-  return best;
+  return rings;
 }
 
 }  // namespace zeropose

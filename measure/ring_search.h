@@ -10,7 +10,7 @@ namespace zeropose {
 // their covariances; since a tilted circle's centre moves with the square of its radius, it is the centre of
 // the circle radius_share. The numbers and the shape are those of the outer circle. Precondition: as
 // look_for_discs(), and inner_shares descend within 0..1.
-MarkFinding find_ring(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                      MarkWorkspace& workspace);
+MarkSight look_for_rings(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                         HowMany wanted, MarkWorkspace& workspace);
 
 }  // namespace zeropose
