@@ -41,6 +41,12 @@ MarkFinding with_status(MarkStatus status) {
   return finding;
 }
 
+// Its memory is kept from one frame to the next; a fresh one costs as much as a search.
+MarkWorkspace& kept_workspace() {
+  thread_local MarkWorkspace workspace;
+  return workspace;
+}
+
 MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wanted,
                    MarkWorkspace& workspace) {
   if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
@@ -75,14 +81,14 @@ PixelWindow window_of(const ImageView& image, const MarkSearch& s) {
 std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const MarkSearch> searches) {
   std::vector<MarkFinding> findings;
   findings.reserve(searches.size());
-  MarkWorkspace workspace;
+  MarkWorkspace& workspace = kept_workspace();
   for (const MarkSearch& search : searches)
     findings.push_back(look_for(image, search, HowMany::one, workspace).only());
   return findings;
 }
 
 AllMarks find_all_marks(const ImageView& image, const MarkSearch& search) {
-  MarkWorkspace workspace;
+  MarkWorkspace& workspace = kept_workspace();
   MarkSight sight = look_for(image, search, HowMany::all, workspace);
   std::erase_if(sight.standing, [](const MarkFinding& mark) { return mark.status != MarkStatus::found; });
   return {std::move(sight.standing), sight.nearest};

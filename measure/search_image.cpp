@@ -3,20 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <numeric>
 
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
 
-template <typename Pixel>
-void add_columns(const Pixel* __restrict row, int width, std::uint32_t* __restrict sums) {
+void add_columns(const std::uint16_t* __restrict row, int width, std::uint32_t* __restrict sums) {
   for (int i = 0; i < width; ++i) sums[i] += row[i];
 }
 
 // Means of means, each rounded up at a half: the compiler has instructions for these.
-void reduce_bytes_by_two(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, int width,
-                         std::uint8_t* __restrict both, std::uint8_t* __restrict out) {
+void halve(const std::uint8_t* __restrict a, const std::uint8_t* __restrict b, int width,
+           std::uint8_t* __restrict both, std::uint8_t* __restrict out) {
   for (int i = 0; i < 2 * width; ++i) both[i] = static_cast<std::uint8_t>((a[i] + b[i] + 1) >> 1);
   for (int i = 0; i < width; ++i)
     out[i] = static_cast<std::uint8_t>((both[2 * i] + both[2 * i + 1] + 1) >> 1);
@@ -97,9 +98,9 @@ void SearchImage::prepare(const ImageView& image, const PixelWindow& window, int
   greys_.resize(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(std::max(0, height_)));
   if (empty()) return;
   if (image.two_bytes()) {
-    reduce<std::uint16_t>(image, window);
+    reduce_words(image, window);
   } else {
-    reduce<std::uint8_t>(image, window);
+    reduce_bytes(image, window);
   }
   for (int v = 0; v < height_; ++v) {
     std::uint8_t* row = greys_.data() + std::ptrdiff_t{v} * stride_;
@@ -108,30 +109,41 @@ void SearchImage::prepare(const ImageView& image, const PixelWindow& window, int
   measure_tiles();
 }
 
-template <typename Pixel>
-void SearchImage::reduce(const ImageView& image, const PixelWindow& window) {
+// Halves as often as it takes, rows in pairs: in one byte each, which rounds once more at every step.
+void SearchImage::reduce_bytes(const ImageView& image, const PixelWindow& window) {
   for (int v = 0; v < height_; ++v) {
-    std::uint8_t* __restrict out = greys_.data() + std::ptrdiff_t{v} * stride_;
-    const int from = window.v0 + v * reduction_;
-    if (sizeof(Pixel) == 1 && reduction_ == 1) {
-      std::copy_n(image.row(from) + window.u0, width_, out);
-      continue;
+    std::uint8_t* out = greys_.data() + std::ptrdiff_t{v} * stride_;
+    const std::uint8_t* source = image.row(window.v0 + v * reduction_) + window.u0;
+    std::ptrdiff_t step = image.stride_bytes;
+    int rows = reduction_, width = width_ * reduction_;
+    if (rows == 1) std::copy_n(source, width, out);
+    means_.resize(static_cast<std::size_t>(width));
+    for (std::size_t k = 0; rows > 1; k = 1 - k) {
+      rows /= 2, width /= 2;
+      halves_[k].resize(static_cast<std::size_t>(rows * width));
+      for (int r = 0; r < rows; ++r) {
+        std::uint8_t* half = rows == 1 ? out : halves_[k].data() + std::ptrdiff_t{r} * width;
+        halve(source + 2 * r * step, source + (2 * r + 1) * step, width, means_.data(), half);
+      }
+      source = halves_[k].data();
+      step = width;
     }
-    if (sizeof(Pixel) == 1 && reduction_ == 2) {
-      means_.resize(static_cast<std::size_t>(2 * width_));
-      reduce_bytes_by_two(image.row(from) + window.u0, image.row(from + 1) + window.u0, width_, means_.data(),
-                          out);
-      continue;
-    }
+  }
+}
+
+void SearchImage::reduce_words(const ImageView& image, const PixelWindow& window) {
+  const float scale =
+      static_cast<float>(image.grey_per_count()) / static_cast<float>(reduction_ * reduction_);
+  for (int v = 0; v < height_; ++v) {
     sums_.assign(static_cast<std::size_t>(width_ * reduction_), 0);
     for (int k = 0; k < reduction_; ++k)
-      add_columns(image.row<Pixel>(from + k) + window.u0, width_ * reduction_, sums_.data());
-    const float scale =
-        static_cast<float>(image.grey_per_count()) / static_cast<float>(reduction_ * reduction_);
+      add_columns(image.row<std::uint16_t>(window.v0 + v * reduction_ + k) + window.u0, width_ * reduction_,
+                  sums_.data());
+    std::uint8_t* out = greys_.data() + std::ptrdiff_t{v} * stride_;
     for (int i = 0; i < width_; ++i) {
-      std::uint32_t sum = 0;
-      for (int k = 0; k < reduction_; ++k) sum += sums_[static_cast<std::size_t>(i * reduction_ + k)];
-      out[i] = static_cast<std::uint8_t>(std::min(255.0F, static_cast<float>(sum) * scale + 0.5F));
+      const auto* first = sums_.data() + std::ptrdiff_t{i} * reduction_;
+      const auto sum = static_cast<float>(std::accumulate(first, first + reduction_, std::uint32_t{0}));
+      out[i] = static_cast<std::uint8_t>(std::min(255.0F, sum * scale + 0.5F));
     }
   }
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -44,8 +45,8 @@ class SearchImage {
   Eigen::Vector2d in_image(const Eigen::Vector2d& at) const { return origin_px_ + double(reduction_) * at; }
 
  private:
-  template <typename Pixel>
-  void reduce(const ImageView& image, const PixelWindow& window);
+  void reduce_bytes(const ImageView& image, const PixelWindow& window);
+  void reduce_words(const ImageView& image, const PixelWindow& window);
   void measure_tiles();
   std::vector<FlatTile> flat_tiles() const;
 
@@ -54,6 +55,7 @@ class SearchImage {
   std::vector<std::uint8_t> greys_;
   std::vector<TileRange> tiles_;
   std::vector<std::uint8_t> lows_, highs_, means_;  // of a row
+  std::array<std::vector<std::uint8_t>, 2> halves_;
   std::vector<std::uint32_t> sums_;
 };
 
