@@ -12,7 +12,6 @@ namespace zeropose::test {
 namespace {
 
 using Eigen::MatrixXd;
-using Eigen::MatrixXf;
 using Eigen::Vector2d;
 
 constexpr double pi = std::numbers::pi;
@@ -112,70 +111,128 @@ int reach_of(const HardLens& lens) {
       std::ceil(Diffraction::reach_px + lens.defocus_px + 0.5 * lens.motion_px.cwiseAbs().maxCoeff()));
 }
 
-// What one pixel gathers from the cells round its middle; one column per row of cells.
-MatrixXf kernel_of(const HardLens& lens, const HardSensor& sensor) {
+// What one pixel gathers from the cells round its middle, and in all from each pixel of cells, row by row.
+struct Kernel {
+  int side_px = 0;
+  std::vector<float> cells;
+  std::vector<float> blocks;
+};
+
+Kernel kernel_from(const MatrixXd& weights) {
+  Kernel kernel;
+  const auto n = weights.rows();
+  kernel.side_px = static_cast<int>(n) / cells_per_px;
+  const double sum = weights.sum();
+  for (Eigen::Index j = 0; j < n; ++j) {
+    for (Eigen::Index i = 0; i < n; ++i) kernel.cells.push_back(static_cast<float>(weights(j, i) / sum));
+  }
+  for (Eigen::Index j = 0; j < n; j += cells_per_px) {
+    for (Eigen::Index i = 0; i < n; i += cells_per_px) {
+      kernel.blocks.push_back(
+          static_cast<float>(weights.block<cells_per_px, cells_per_px>(j, i).sum() / sum));
+    }
+  }
+  return kernel;
+}
+
+Kernel kernel_of(const HardLens& lens, const HardSensor& sensor) {
   const Diffraction core(lens.first_zero_px);
   const Diffraction wide(lens.second_share > 0 ? lens.second_zero_px : lens.first_zero_px);
   const int n = (2 * reach_of(lens) + 1) * cells_per_px;
-  MatrixXd kernel(n, n);
+  MatrixXd weights(n, n);
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < n; ++i) {
       const double r = std::hypot(i - 0.5 * (n - 1), j - 0.5 * (n - 1)) / cells_per_px;
-      kernel(j, i) = (1 - lens.second_share) * core(r) + lens.second_share * wide(r);
+      weights(j, i) = (1 - lens.second_share) * core(r) + lens.second_share * wide(r);
     }
   }
-  kernel = smeared(kernel, pixel_box(sensor.fill_factor));
-  if (lens.defocus_px > 0) kernel = smeared(kernel, confusion_disc(lens.defocus_px));
-  if (lens.motion_px.norm() > 0) kernel = smeared(kernel, motion_line(lens.motion_px));
-  return (kernel / kernel.sum()).transpose().cast<float>();
+  weights = smeared(weights, pixel_box(sensor.fill_factor));
+  if (lens.defocus_px > 0) weights = smeared(weights, confusion_disc(lens.defocus_px));
+  if (lens.motion_px.norm() > 0) weights = smeared(weights, motion_line(lens.motion_px));
+  return kernel_from(weights);
 }
 
-// Least and greatest light in each pixel's cells.
-struct Extremes {
-  int width = 0;
-  std::vector<float> low, high;
-};
-
-Extremes extremes_of(const Radiance& radiance) {
-  Extremes extremes;
-  extremes.width = radiance.width_cells / cells_per_px;
-  const int height = radiance.height_cells / cells_per_px;
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < extremes.width; ++u) {
-      float low = 1e30F, high = -1e30F;
-      for (int j = 0; j < cells_per_px; ++j) {
-        const float* cell = radiance.cells.data() +
-                            std::ptrdiff_t{v * cells_per_px + j} * radiance.width_cells + u * cells_per_px;
-        for (int i = 0; i < cells_per_px; ++i) low = std::min(low, cell[i]), high = std::max(high, cell[i]);
+// Gathers light through the kernel; quick where the cells of a pixel are all alike, quicker where all pixels
+// are.
+class Gathering {
+ public:
+  Gathering(const Radiance& radiance, const Kernel& kernel)
+      : radiance_(radiance), kernel_(kernel), width_(radiance.width_cells / cells_per_px) {
+    const int height = radiance.height_cells / cells_per_px;
+    for (int v = 0; v < height; ++v) {
+      for (int u = 0; u < width_; ++u) {
+        const bool even = is_even(u, v);
+        level_.push_back(even ? *cell(u, v) : uneven);
+        const bool goes_on = even && u > 0 && level_[level_.size() - 2] == level_.back();
+        alike_.push_back(even ? goes_on ? alike_.back() + 1 : 1 : 0);
       }
-      extremes.low.push_back(low);
-      extremes.high.push_back(high);
     }
   }
-  return extremes;
-}
 
-bool is_flat(const Extremes& extremes, int u, int v, int side) {
-  const auto first = static_cast<std::size_t>(v * extremes.width + u);
-  const float level = extremes.low[first];
-  for (int j = 0; j < side; ++j) {
-    for (int i = 0; i < side; ++i) {
-      const std::size_t k = first + static_cast<std::size_t>(j * extremes.width + i);
-      if (extremes.low[k] != level || extremes.high[k] != level) return false;
+  // (u, v): the kernel's first pixel, counted from the margin's corner.
+  double at(int u, int v) const {
+    if (is_flat(u, v)) return double{level_[index(u, v)]};
+    double sum = 0;
+    const float* weight = kernel_.blocks.data();
+    for (int j = 0; j < kernel_.side_px; ++j) {
+      const float* level = level_.data() + index(u, v + j);
+      float row = 0;
+      for (int i = 0; i < kernel_.side_px; ++i, ++weight) {
+        row += level[i] != uneven ? *weight * level[i] : of_pixel(u + i, v + j, i, j);
+      }
+      sum += double{row};
     }
+    return sum;
   }
-  return true;
-}
 
-double gathered(const Radiance& radiance, const MatrixXf& kernel, int u, int v) {
-  double sum = 0;
-  for (Eigen::Index j = 0; j < kernel.cols(); ++j) {
-    const float* row = radiance.cells.data() + (std::ptrdiff_t{v} * cells_per_px + j) * radiance.width_cells +
-                       u * cells_per_px;
-    sum += double{Eigen::Map<const Eigen::VectorXf>(row, kernel.rows()).dot(kernel.col(j))};
+ private:
+  static constexpr float uneven = -1;
+
+  std::size_t index(int u, int v) const { return static_cast<std::size_t>(v * width_ + u); }
+
+  bool is_flat(int u, int v) const {
+    const float level = level_[index(u, v)];
+    for (int j = 0; j < kernel_.side_px; ++j) {
+      const std::size_t last = index(u + kernel_.side_px - 1, v + j);
+      if (alike_[last] < kernel_.side_px || level_[last] != level) return false;
+    }
+    return true;
   }
-  return sum;
-}
+
+  const float* cell(int u, int v) const {
+    return radiance_.cells.data() + std::ptrdiff_t{v} * cells_per_px * radiance_.width_cells +
+           std::ptrdiff_t{u} * cells_per_px;
+  }
+
+  bool is_even(int u, int v) const {
+    const float* row = cell(u, v);
+    const float level = *row;
+    for (int j = 0; j < cells_per_px; ++j, row += radiance_.width_cells) {
+      for (int i = 0; i < cells_per_px; ++i) {
+        if (row[i] != level) return false;
+      }
+    }
+    return true;
+  }
+
+  float of_pixel(int u, int v, int i, int j) const {
+    const int kernel_row = kernel_.side_px * cells_per_px;
+    const float *light = cell(u, v), *weight = kernel_.cells.data() + (j * kernel_row + i) * cells_per_px;
+    std::array<float, cells_per_px> sums{};
+    for (int y = 0; y < cells_per_px; ++y, light += radiance_.width_cells, weight += kernel_row) {
+      for (std::size_t x = 0; x < sums.size(); ++x) sums[x] += light[x] * weight[x];
+    }
+    float sum = 0;
+    for (const float part : sums) sum += part;
+    return sum;
+  }
+
+  const Radiance& radiance_;
+  const Kernel& kernel_;
+  int width_;
+  std::vector<float> level_;  // of a pixel's cells, or uneven
+  std::vector<int> alike_;    // how many pixels up to this one, along the row, have its level
+};
 
 void blur_lines(std::vector<double>& light, int count, int length, std::ptrdiff_t line, std::ptrdiff_t along,
                 double sigma) {
@@ -244,15 +301,11 @@ Shot finished(Shot shot, const HardSensor& sensor) {
 Irradiance expose_scene(const HardScene& scene, const HardLens& lens, const HardSensor& sensor) {
   const int reach = reach_of(lens);
   const Radiance radiance = radiance_of(scene, sensor.gamma, reach);
-  const MatrixXf kernel = kernel_of(lens, sensor);
-  const Extremes extremes = extremes_of(radiance);
+  const Kernel kernel = kernel_of(lens, sensor);
+  const Gathering gathering(radiance, kernel);
   Irradiance picture{scene.width_px, scene.height_px, {}};
   for (int v = 0; v < scene.height_px; ++v) {
-    for (int u = 0; u < scene.width_px; ++u) {
-      const bool flat = is_flat(extremes, u, v, 2 * reach + 1);
-      picture.light.push_back(flat ? double{extremes.low[static_cast<std::size_t>(v * extremes.width + u)]}
-                                   : gathered(radiance, kernel, u, v));
-    }
+    for (int u = 0; u < scene.width_px; ++u) picture.light.push_back(gathering.at(u, v));
   }
   if (lens.veil_share > 0) add_veil(picture, lens.veil_share, lens.veil_px);
   for (int v = 0; v < scene.height_px; ++v) {
