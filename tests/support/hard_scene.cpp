@@ -37,11 +37,11 @@ double cover_at(const Layer& layer, double distance_px) {
   return distance_px < 0 ? 1 : 0;
 }
 
-// Share of a cell that is covered: 6 x 6 points where the outline crosses it.
+// Share of a cell that is covered: 4 x 4 points where the outline crosses it.
 double cover_of_cell(const Layer& layer, const Vector2d& middle_px) {
   const double distance_px = layer.distance_px(middle_px);
   if (layer.soft_px > 0 || std::abs(distance_px) > 1.2 * cell_px) return cover_at(layer, distance_px);
-  constexpr int points = 6;
+  constexpr int points = 4;
   double sum = 0;
   for (int j = 0; j < points; ++j) {
     for (int i = 0; i < points; ++i) {
