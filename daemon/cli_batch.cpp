@@ -15,6 +15,7 @@
 #include "daemon/cli_answer.h"
 #include "daemon/cli_calibrate.h"
 #include "daemon/cli_convert.h"
+#include "daemon/cli_find.h"
 #include "daemon/cli_find_board.h"
 #include "daemon/cli_help.h"
 #include "measure/pose.h"
@@ -273,6 +274,7 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_bestfit(app, exit_status);
   add_calibrate(app, exit_status);
   add_convert(app, exit_status);
+  add_find(app, exit_status);
   add_find_board(app, exit_status);
 }
 

@@ -24,9 +24,7 @@ void to_8_bit(cv::Mat& picture) {
   picture.convertTo(picture, CV_8U, scale, -lowest * scale);
 }
 
-}  // namespace
-
-GreyImage load_grey_image(const std::filesystem::path& path) {
+cv::Mat load_picture(const std::filesystem::path& path) {
   const std::string bytes = read_file(path);
   cv::Mat picture;
   try {
@@ -37,9 +35,30 @@ GreyImage load_grey_image(const std::filesystem::path& path) {
   }
   if (picture.empty() || (picture.depth() != CV_8U && picture.depth() != CV_16U))
     throw ConfigError({path.string() + ": found no picture, expected PNG, JPEG, TIFF or PGM, 8 or 16 bit"});
-  if (picture.depth() == CV_16U) to_8_bit(picture);
-  GreyImage image{picture.cols, picture.rows, {}};
+  return picture;
+}
+
+GreyImage bytes_of(const cv::Mat& picture) {
+  GreyImage image{picture.cols, picture.rows, {}, {}, 255};
   image.grey.assign(picture.begin<std::uint8_t>(), picture.end<std::uint8_t>());
+  return image;
+}
+
+}  // namespace
+
+GreyImage load_grey_image(const std::filesystem::path& path) {
+  cv::Mat picture = load_picture(path);
+  if (picture.depth() == CV_16U) to_8_bit(picture);
+  return bytes_of(picture);
+}
+
+GreyImage load_deep_image(const std::filesystem::path& path) {
+  const cv::Mat picture = load_picture(path);
+  if (picture.depth() == CV_8U) return bytes_of(picture);
+  GreyImage image{picture.cols, picture.rows, {}, {}, 511};
+  image.deep.assign(picture.begin<std::uint16_t>(), picture.end<std::uint16_t>());
+  const int highest = *std::max_element(image.deep.begin(), image.deep.end());
+  while (image.white < highest) image.white = 2 * image.white + 1;
   return image;
 }
 

@@ -30,8 +30,15 @@ void draw_found(cv::Mat& picture, const MarkFinding& finding) {
            sub_bits);
   cv::line(picture, fixed(finding.u_px - along), fixed(finding.u_px + along), green, 1, cv::LINE_AA,
            sub_bits);
-  cv::circle(picture, fixed(finding.u_px), static_cast<int>(finding.diameter_px / 2 + 6) << sub_bits, green,
-             1, cv::LINE_AA, sub_bits);
+  if (finding.shape_px2.isZero()) return;
+  const double mean = finding.shape_px2.trace() / 2;
+  const double spread =
+      std::hypot((finding.shape_px2(0, 0) - finding.shape_px2(1, 1)) / 2, finding.shape_px2(0, 1));
+  const double angle =
+      0.5 * std::atan2(2 * finding.shape_px2(0, 1), finding.shape_px2(0, 0) - finding.shape_px2(1, 1));
+  const cv::Point half = fixed({std::sqrt(mean + spread), std::sqrt(std::max(0.0, mean - spread))});
+  cv::ellipse(picture, fixed(finding.u_px), {half.x, half.y}, angle * 180 / CV_PI, 0, 360, green, 1,
+              cv::LINE_AA, sub_bits);
 }
 
 void draw(cv::Mat& picture, const MarkOverlay& mark) {
@@ -46,8 +53,13 @@ void draw(cv::Mat& picture, const MarkOverlay& mark) {
 
 cv::Mat colour_copy(const ImageView& image) {
   // OpenCV has no read-only view; the pixels are only read.
-  const cv::Mat grey(image.height_px, image.width_px, CV_8UC1, const_cast<std::uint8_t*>(image.data),
-                     static_cast<std::size_t>(image.stride_bytes));
+  cv::Mat grey(image.height_px, image.width_px, image.two_bytes() ? CV_16UC1 : CV_8UC1,
+               const_cast<std::uint8_t*>(image.data), static_cast<std::size_t>(image.stride_bytes));
+  if (image.two_bytes()) {
+    cv::Mat bytes;
+    grey.convertTo(bytes, CV_8U, image.grey_per_count());
+    grey = bytes;
+  }
   cv::Mat picture;
   cv::cvtColor(grey, picture, cv::COLOR_GRAY2BGR);
   return picture;

@@ -10,7 +10,7 @@
 #include <optional>
 #include <random>
 
-#include "measure/edge_points.h"
+#include "measure/edge_map.h"
 #include "measure/search_image.h"
 #include "measure/small_cholesky.h"
 

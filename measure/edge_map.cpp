@@ -1,4 +1,4 @@
-#include "measure/edge_points.h"
+#include "measure/edge_map.h"
 
 #include <algorithm>
 #include <cmath>
