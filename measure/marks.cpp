@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "measure/disc_search.h"
+#include "measure/edge_marks.h"
 #include "measure/ring_search.h"
 
 namespace zeropose {
@@ -41,16 +42,27 @@ MarkFinding with_status(MarkStatus status) {
   return finding;
 }
 
+MarkSight sight_of_one(const MarkFinding& finding) {
+  if (finding.status == MarkStatus::found) return {{finding}, {}};
+  return {{}, finding};
+}
+
 // Its memory is kept from one frame to the next; a fresh one costs as much as a search.
 MarkWorkspace& kept_workspace() {
   thread_local MarkWorkspace workspace;
   return workspace;
 }
 
+bool is_round(MarkKind kind) {
+  return kind == MarkKind::disc || kind == MarkKind::ball || kind == MarkKind::ring;
+}
+
 MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wanted,
                    MarkWorkspace& workspace) {
-  if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
-    return {{}, with_status(status)};
+  // The others look by themselves whether a search makes sense.
+  if (is_round(search.kind))
+    if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
+      return {{}, with_status(status)};
   const PixelWindow window = window_of(image, search);
   switch (search.kind) {
     case MarkKind::disc:
@@ -59,9 +71,13 @@ MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wan
     case MarkKind::ring:
       return look_for_rings(image, window, search, wanted, workspace);
     case MarkKind::slot:
+      return sight_of_one(find_slot(image, search));
     case MarkKind::cross:
+      return sight_of_one(find_cross(image, search));
     case MarkKind::corner:
+      return sight_of_one(find_corner(image, search));
     case MarkKind::edge:
+      return sight_of_one(find_edge(image, search));
     case MarkKind::pattern:
       break;
   }

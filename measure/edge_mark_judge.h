@@ -1,0 +1,46 @@
+// What the marks with straight edges share: the window, the verdict on a fit, the choice among several.
+// Internal to the room.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "measure/contour_fit.h"
+#include "measure/line_search.h"
+#include "measure/marks.h"
+
+namespace zeropose {
+
+// The grey levels of a search's window, or why there are none.
+struct OpenedWindow {
+  MarkStatus status = MarkStatus::not_searched;  // found: there are
+  GreyWindow greys;
+};
+
+// limits_sizes: the search is to have sensible limits of size.
+OpenedWindow open_window(const ImageView& image, const MarkSearch& search, bool limits_sizes);
+
+// Status, contrast, blur, quality and share of a fit. Its sizes and directions are not judged.
+MarkFinding judged_fit(const ContourFit& fit, const MarkSearch& search);
+
+// Fitted, whether it passed or not; strength: contrast times length, to compare.
+struct JudgedMark {
+  MarkFinding finding;
+  double strength = 0;
+};
+
+// The strongest that passed; ambiguous, with its numbers, if another one is nearly as strong; else the most
+// telling failure. None: no_candidate, or low_contrast if the window has less than the search's.
+MarkFinding chosen_mark(const std::vector<JudgedMark>& marks, const GreyWindow& window,
+                        const MarkSearch& search);
+
+// Difference of two directions of a line, which has no sense: -pi/2..pi/2.
+double wrapped_line_rad(double angle_rad);
+
+// Place in the image of one in the window, px.
+Eigen::Vector2d to_image(const GreyWindow& window, const Eigen::Vector2d& at);
+Eigen::Vector2d to_window(const GreyWindow& window, const Eigen::Vector2d& u_px);
+
+LineLimits line_limits_of(const MarkSearch& search);
+
+}  // namespace zeropose
