@@ -38,6 +38,21 @@ constexpr int lanes_at_once = 8;
 
 }  // namespace
 
+GreyField part_of(const GreyField& field, const PixelWindow& window) {
+  GreyField part{window.width(), window.height(), {}};
+  part.grey.resize(static_cast<std::size_t>(part.width) * static_cast<std::size_t>(part.height));
+  const int first = std::clamp(-window.u0, 0, part.width),
+            last = std::clamp(field.width - window.u0, 0, part.width);
+  for (int j = 0; j < part.height; ++j) {
+    const float* const from = field.row(std::clamp(window.v0 + j, 0, field.height - 1));
+    float* const to = part.row(j);
+    std::fill(to, to + first, from[0]);
+    std::copy(from + window.u0 + first, from + window.u0 + last, to + first);
+    std::fill(to + last, to + part.width, from[field.width - 1]);
+  }
+  return part;
+}
+
 GreyField field_of(const ImageView& image, const PixelWindow& window) {
   const PixelWindow inner{
       std::clamp(window.u0, 0, image.width_px - 1), std::clamp(window.v0, 0, image.height_px - 1),
@@ -45,15 +60,8 @@ GreyField field_of(const ImageView& image, const PixelWindow& window) {
   GreyField seen{inner.width(), inner.height(), {}};
   copy_greys(image, inner, seen.grey);
   if (seen.width == window.width() && seen.height == window.height()) return seen;
-  GreyField field{window.width(), window.height(), {}};
-  field.grey.resize(static_cast<std::size_t>(field.width) * static_cast<std::size_t>(field.height));
-  for (int j = 0; j < field.height; ++j) {
-    const float* const from = seen.row(std::clamp(window.v0 + j - inner.v0, 0, seen.height - 1));
-    float* const to = field.row(j);
-    for (int i = 0; i < field.width; ++i)
-      to[i] = from[std::clamp(window.u0 + i - inner.u0, 0, seen.width - 1)];
-  }
-  return field;
+  return part_of(seen,
+                 {window.u0 - inner.u0, window.v0 - inner.v0, window.u1 - inner.u0, window.v1 - inner.v0});
 }
 
 GreyField halved(const GreyField& field) {

@@ -23,6 +23,9 @@ struct GreyField {
 // of them is empty.
 GreyField field_of(const ImageView& image, const PixelWindow& window);
 
+// A part of a field; where it reaches beyond it the nearest pixel stands in. Precondition: they overlap.
+GreyField part_of(const GreyField& field, const PixelWindow& window);
+
 // Half the size, rounded down, after smoothing with 1 3 3 1 both ways. Pixel i lies at 2 i + 0.5 of the
 // larger one.
 GreyField halved(const GreyField& field);

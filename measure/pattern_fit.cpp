@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "measure/small_cholesky.h"
 
@@ -16,6 +17,10 @@ constexpr float full_weight_sigmas = 2.5F, no_weight_sigmas = 4.5F;
 constexpr double cut_variance = 0.9824;  // of normal residuals under these weights
 constexpr double rounding_variance = 1.0 / 12;
 constexpr double linear_prior = 0.1;  // sigma: holds what a patch of rings leaves open
+constexpr double slope_noise_share =
+    0.766;  // of the image's noise, interpolated, in what slopes' noise picks up
+constexpr double white_grey = 254.999;
+constexpr double farthest_start_px = 1e6;
 constexpr double longest_step_px = 1.5;
 constexpr double least_share = 0.3;  // of the patch, below that there is nothing to match
 
@@ -26,17 +31,26 @@ double interpolated_noise(double t) {
   return 1 + 0.1095 * q - 4.3127 * q * q;
 }
 
+// What of a field is image.
+struct SeenPart {
+  double u0 = 0, v0 = 0, u1 = 0, v1 = 0;  // px
+};
+
 // One match under way.
 class Match {
  public:
-  Match(const PatternLevel& level, const GreySpline& spline, const GreyField& field, const SeenPart& seen,
+  Match(const PatternLevel& level, GreySpline spline, const GreyField& field, const SeenPart& seen,
         const PatternWarp& start, double noise_grey)
-      : p_(level), spline_(spline), field_(field), seen_(seen), patch_noise_(noise_grey), warp_(start) {
+      : p_(level),
+        spline_(std::move(spline)),
+        field_(field),
+        seen_(seen),
+        patch_noise_(noise_grey),
+        warp_(start) {
     for (std::vector<float>* part : {&grey_, &valid_, &residual_, &weight_, &weighted_})
       part->assign(p_.size(), 0.0F);
     whole_ = information_of(p_, p_.counts);
-    any_white_ = std::isfinite(seen_.white) &&
-                 *std::max_element(field_.grey.begin(), field_.grey.end()) >= float(seen_.white);
+    any_white_ = *std::max_element(field_.grey.begin(), field_.grey.end()) >= float(white_grey);
   }
 
   PatternFit run(const MatchLimits& limits);
@@ -62,7 +76,7 @@ class Match {
   double blur_px2() const;
 
   const PatternLevel& p_;
-  const GreySpline& spline_;
+  GreySpline spline_;
   const GreyField& field_;
   SeenPart seen_;
   double patch_noise_;
@@ -98,7 +112,7 @@ void Match::sample_row(int j) {
         double{u} >= seen_.u0 && double{v} >= seen_.v0 && double{u} <= seen_.u1 && double{v} <= seen_.v1;
     const bool white =
         inside && any_white_ &&
-        field_.row(static_cast<int>(v + 0.5F))[static_cast<int>(u + 0.5F)] >= float(seen_.white);
+        field_.row(static_cast<int>(v + 0.5F))[static_cast<int>(u + 0.5F)] >= float(white_grey);
     grey_[begin + std::size_t(i)] = inside ? spline_.at(u, v) : 0;
     valid_[begin + std::size_t(i)] = inside && !white ? 1 : 0;
     seen_count_ += inside ? 1 : 0;
@@ -239,18 +253,17 @@ double Match::mean_interpolated_noise() const {
 // Smoothing takes the fine part of the noise, which hardly moves the place: in the covariance it counts in
 // full.
 void Match::report_covariance(PatternFit& fit) const {
-  const double g2 = gain_ * gain_, patch_variance = patch_noise_ * patch_noise_;
-  const double variance = fit.noise_grey * fit.noise_grey + g2 * patch_variance;
-  const double share = used_ / p_.area();
+  const double image_variance = fit.noise_grey * fit.noise_grey, patch_variance = patch_noise_ * patch_noise_;
+  const double variance = image_variance + gain_ * gain_ * patch_variance, share = used_ / p_.area();
   const MatchMatrix N = share < 0.97 ? information_of(p_, weight_) : MatchMatrix(share * whole_);
-  const MatchMatrix R = prior(), noise = share * patch_variance * slope_noise_of(p_);
-  const SmallCholesky<match_unknowns> solver(N + R - noise);
+  const MatchMatrix of_noise = share * patch_variance * slope_noise_of(p_), signal = N + prior() - of_noise;
+  const SmallCholesky<match_unknowns> solver(signal);
   if (!solver.ok()) {
     fit.converged = false;
     return;
   }
   const MatchMatrix K = solver.inverse();
-  fit.covariance = variance * K * (N + R) * K;
+  fit.covariance = K * (variance * signal + slope_noise_share * image_variance * of_noise) * K;
   fit.covariance.topRows<6>() /= gain_;
   fit.covariance.leftCols<6>() /= gain_;
   fit.converged = fit.converged && fit.covariance.allFinite();
@@ -310,6 +323,29 @@ PixelWindow window_about(const PatternWarp& warp, const PatternLevel& level, dou
           static_cast<int>(high.y())};
 }
 
+// In the part about the start of what is width x height large. part_at: the greys of a window.
+template <typename PartAt>
+PatternFit match_in(const PatternLevel& level, int width, int height, const PartAt& part_at,
+                    const PatternWarp& start, double noise_grey, const MatchLimits& limits) {
+  if (!start.middle_px.allFinite() || !start.linear.allFinite() ||
+      start.middle_px.cwiseAbs().maxCoeff() > farthest_start_px) {
+    return {};
+  }
+  const double turning = 0.06 * 0.5 * std::hypot(level.width, level.height);
+  const PixelWindow window = window_about(start, level, limits.farthest_px + turning + 1);
+  if (window.u1 < 0 || window.v1 < 0 || window.u0 >= width || window.v0 >= height) return {};
+  const Vector2d origin(window.u0, window.v0);
+  const SeenPart seen{std::max(0.0, -origin.x()), std::max(0.0, -origin.y()),
+                      std::min(window.u1, width - 1) - origin.x(),
+                      std::min(window.v1, height - 1) - origin.y()};
+  PatternWarp here = start;
+  here.middle_px -= origin;
+  const GreyField field = part_at(window);
+  PatternFit fit = Match(level, GreySpline(field), field, seen, here, noise_grey).run(limits);
+  fit.warp.middle_px += origin;
+  return fit;
+}
+
 }  // namespace
 
 double rotation_of(const PatternWarp& warp) {
@@ -325,28 +361,16 @@ double squeeze_of(const PatternWarp& warp) {
   return like + unlike > 0 ? (like - unlike) / (like + unlike) : 0;
 }
 
-PatternFit match_level(const PatternLevel& level, const GreyField& field, const SeenPart& seen,
-                       const PatternWarp& start, double noise_grey, const MatchLimits& limits) {
-  const GreySpline spline(field);
-  return Match(level, spline, field, seen, start, noise_grey).run(limits);
+PatternFit match_level(const PatternLevel& level, const GreyField& field, const PatternWarp& start,
+                       double noise_grey, const MatchLimits& limits) {
+  const auto part = [&field](const PixelWindow& window) { return part_of(field, window); };
+  return match_in(level, field.width, field.height, part, start, noise_grey, limits);
 }
 
 PatternFit fit_pattern(const ImageView& image, const Pattern& pattern, const PatternLevel& level,
                        const PatternWarp& start, const MatchLimits& limits) {
-  if (!start.middle_px.allFinite() || !start.linear.allFinite()) return {};
-  const double turning = 0.06 * 0.5 * std::hypot(level.width, level.height);
-  const PixelWindow window = window_about(start, level, limits.farthest_px + turning + 1);
-  if (window.u1 < 0 || window.v1 < 0 || window.u0 >= image.width_px || window.v0 >= image.height_px)
-    return {};
-  const Vector2d origin(window.u0, window.v0);
-  const SeenPart seen{std::max(0.0, -origin.x()), std::max(0.0, -origin.y()),
-                      std::min(window.u1, image.width_px - 1) - origin.x(),
-                      std::min(window.v1, image.height_px - 1) - origin.y(), 254.999};
-  PatternWarp here = start;
-  here.middle_px -= origin;
-  PatternFit fit = match_level(level, field_of(image, window), seen, here, pattern.noise_grey, limits);
-  fit.warp.middle_px += origin;
-  return fit;
+  const auto part = [&image](const PixelWindow& window) { return field_of(image, window); };
+  return match_in(level, image.width_px, image.height_px, part, start, pattern.noise_grey, limits);
 }
 
 GreyField field_of(const Pattern& pattern) { return {pattern.width_px, pattern.height_px, pattern.greys}; }

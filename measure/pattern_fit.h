@@ -3,8 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <limits>
-#include <numbers>
 
 #include "measure/grey_field.h"
 #include "measure/image.h"
@@ -54,8 +52,9 @@ struct SeenPart {
 // I. Matthews: Lucas-Kanade 20 years on, IJCV 2004) over the image's cubic spline with weights that fall to 0
 // between 2.5 and 4.5 robust sigmas. The slopes are the patch's, so that the noise of the image cannot pull
 // the place towards where interpolation smooths most. noise_grey: of the patch's pixels.
-PatternFit match_level(const PatternLevel& level, const GreyField& field, const SeenPart& seen,
-                       const PatternWarp& start, double noise_grey, const MatchLimits& limits = {});
+// It works on a part of the field about the start; a field may be larger than what is seen of it.
+PatternFit match_level(const PatternLevel& level, const GreyField& field, const PatternWarp& start,
+                       double noise_grey, const MatchLimits& limits = {});
 
 // The same in full size, from a start within limits of the place. Preconditions: pattern taught, level made
 // from it.
