@@ -57,9 +57,10 @@ class GreySpline {
 
   // Of the four coefficients about a place t behind the second of them.
   static Weights weights_of(float t) {
-    const float s = 1 - t, t2 = t * t, s2 = s * s;
-    return {s2 * s * (1.0F / 6), 2.0F / 3 - t2 * (1 - 0.5F * t), 2.0F / 3 - s2 * (1 - 0.5F * s),
-            t2 * t * (1.0F / 6)};
+    constexpr float third = 1.0F / 3, sixth = 1.0F / 6;
+    return Weights(sixth, 2 * third, sixth, 0) +
+           t * (Weights(-0.5F, 0, 0.5F, 0) +
+                t * (Weights(0.5F, -1, 0.5F, 0) + t * Weights(-sixth, 0.5F, -0.5F, sixth)));
   }
 
   int width_, height_, stride_;

@@ -66,7 +66,9 @@ class Match {
   double sum_of_weights() const { return Eigen::Map<const Eigen::ArrayXf>(weight_.data(), size()).sum(); }
   Eigen::Index size() const { return Eigen::Index(p_.size()); }
   bool begin();
+  MatchMatrix information() const;
   MatchMatrix prior() const;
+  double clumping() const;
   void look_again();
   bool step();
   void move(const MatchVector& y);
@@ -147,7 +149,7 @@ void Match::residuals() {
 
 // Sigma from the middle one of some of the residuals' sizes.
 void Match::find_scale() {
-  const std::size_t every = std::max<std::size_t>(1, p_.size() / 600) | 1;
+  const std::size_t every = std::max<std::size_t>(1, p_.size() / 350) | 1;
   sizes_.clear();
   for (std::size_t k = 0; k < p_.size(); k += every) {
     if (valid_[k] > 0) sizes_.push_back(std::abs(residual_[k]));
@@ -202,11 +204,17 @@ void Match::move(const MatchVector& y) {
   if (cut == 1) gain_ += y(6), offset_ += y(7);
 }
 
-// False: cannot go on. What the weights take off the information slows the steps a little, no more.
+// Of the pixels in use; a few that the weights take out everywhere scale it, no more.
+MatchMatrix Match::information() const {
+  const double share = used_ / p_.area();
+  return share < 0.97 ? information_of(p_, weight_) : MatchMatrix(share * whole_);
+}
+
+// False: cannot go on.
 bool Match::step() {
   if (!(gain_ > 0) || used_ < least_share * p_.area()) return false;
   for (std::size_t k = 0; k < p_.size(); ++k) weighted_[k] = weight_[k] * residual_[k];
-  const MatchMatrix N = whole_ * (used_ / p_.area()) + prior();
+  const MatchMatrix N = information() + prior();
   const SmallCholesky<match_unknowns> solver(N);
   if (!solver.ok()) return false;
   const MatchVector y = solver.solve(gradient_of(p_, weighted_));
@@ -249,21 +257,43 @@ double Match::mean_interpolated_noise() const {
   return sum / count;
 }
 
+// By how much residuals that go together over neighbours, as blur and other misfit leave them, widen the
+// variance: (1 + r) / (1 - r) each way, as for a chain of correlation r. Interpolated noise has up to 0.1 of
+// it.
+double Match::clumping() const {
+  const std::ptrdiff_t s = p_.stride;
+  double along_u = 0, along_v = 0, squares = 0;
+  for (int j = 0; j + 1 < p_.height; ++j) {
+    for (int i = 0; i + 1 < p_.width; ++i) {
+      const std::size_t k = std::size_t(j * s + i);
+      const double here = double{weight_[k] * residual_[k]};
+      squares += here * here;
+      along_u += here * double{weight_[k + 1] * residual_[k + 1]};
+      along_v += here * double{weight_[k + std::size_t(s)] * residual_[k + std::size_t(s)]};
+    }
+  }
+  const auto widening = [squares](double products) {
+    const double r = std::clamp(products / std::max(squares, 1e-9) - 0.1, 0.0, 0.9);
+    return (1 + r) / (1 - r);
+  };
+  return widening(along_u) * widening(along_v);
+}
+
 // Residuals are the noise of the image, less what interpolation smooths away, and that of the patch.
 // Smoothing takes the fine part of the noise, which hardly moves the place: in the covariance it counts in
 // full.
 void Match::report_covariance(PatternFit& fit) const {
   const double image_variance = fit.noise_grey * fit.noise_grey, patch_variance = patch_noise_ * patch_noise_;
   const double variance = image_variance + gain_ * gain_ * patch_variance, share = used_ / p_.area();
-  const MatchMatrix N = share < 0.97 ? information_of(p_, weight_) : MatchMatrix(share * whole_);
-  const MatchMatrix of_noise = share * patch_variance * slope_noise_of(p_), signal = N + prior() - of_noise;
+  const MatchMatrix of_noise = share * patch_variance * slope_noise_of(p_),
+                    signal = information() + prior() - of_noise;
   const SmallCholesky<match_unknowns> solver(signal);
   if (!solver.ok()) {
     fit.converged = false;
     return;
   }
   const MatchMatrix K = solver.inverse();
-  fit.covariance = K * (variance * signal + slope_noise_share * image_variance * of_noise) * K;
+  fit.covariance = clumping() * K * (variance * signal + slope_noise_share * image_variance * of_noise) * K;
   fit.covariance.topRows<6>() /= gain_;
   fit.covariance.leftCols<6>() /= gain_;
   fit.converged = fit.converged && fit.covariance.allFinite();

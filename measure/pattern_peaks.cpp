@@ -133,7 +133,7 @@ PatternPeak refined(const GreyField& field, const std::vector<CorrelationMask>& 
 
 std::vector<CorrelationMask> masks_about(const GreyField& patch, const GreySpline& spline, double rotation) {
   std::vector<CorrelationMask> masks;
-  for (const double turn : {0.0, -3 * degree, 3 * degree, -6 * degree, 6 * degree}) {
+  for (const double turn : {0.0, -5 * degree, 5 * degree}) {
     for (const double scale : {1.0, 0.95, 1.05}) {
       CorrelationMask mask = mask_of(patch, spline, rotation + turn, scale);
       if (!mask.weights.grey.empty()) masks.push_back(std::move(mask));

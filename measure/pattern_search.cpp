@@ -14,10 +14,11 @@ namespace {
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
-constexpr int smallest_peak_patch = 9;           // px, of the level where the search begins
-constexpr double least_structure = 0.25;         // of the standard deviation that must be left there
-constexpr double halved_noise = 0.3125;          // sigma of a pixel after halving
-constexpr double promising = 0.55, alike = 0.6;  // correlations: to go on with; of something like it
+constexpr int smallest_peak_patch = 9;                 // px, of the level where the search begins
+constexpr double least_structure = 0.25;               // of the standard deviation that must be left there
+constexpr double halved_noise = 0.3125;                // sigma of a pixel after halving
+constexpr double worth_following = 0.5;                // of the best peak's correlation
+constexpr double rival_promising = 0.75, alike = 0.6;  // correlations: to go on with; of something like it
 constexpr double much_alike = 0.7;  // what stands out of the window must be, to be called the pattern
 constexpr double least_correlation = 0.85, least_share = 0.7;
 constexpr double saturated_share = 0.02;
@@ -125,7 +126,7 @@ PatternCandidate PatternSearcher::followed(PatternWarp warp, double correlation)
     if (k == 1) break;
     const double noise = pattern_.noise_grey * std::pow(halved_noise, double(k - 1));
     const PatternFit fit = match_level(levels_[k - 2], fields_[k - 1], warp, noise,
-                                       {.most_iterations = 8, .last_step_sigmas = 0.3});
+                                       {.most_iterations = 6, .last_step_sigmas = 0.5});
     if (fit.used_share > 0.5 && std::abs(scale_of(fit.warp) - 1) < 0.3 && squeeze_of(fit.warp) > 0.7) {
       warp = fit.warp;
     }
@@ -139,10 +140,13 @@ std::vector<PatternCandidate> PatternSearcher::candidates() const {
   const double least_sigma =
       0.05 * search_.min_contrast * sigma_of(patches_.back()) / sigma_of(patches_.front());
   std::vector<PatternCandidate> found;
+  double best_peak = 0;
   for (const PatternPeak& peak : pattern_peaks(fields_.back(), patches_.back(),
                                                {.rotation_rad = search_.direction_rad,
                                                .tolerance_rad = tolerance_of(search_),
                                                .least_sigma = least_sigma})) {
+    if (!found.empty() && peak.correlation < worth_following * best_peak) continue;
+    best_peak = std::max(best_peak, peak.correlation);
     found.push_back(followed(peak.warp, peak.correlation));
   }
   std::stable_sort(found.begin(), found.end(), [](const PatternCandidate& a, const PatternCandidate& b) {
@@ -177,8 +181,8 @@ void PatternSearcher::describe(const PatternFit& fit, MarkFinding& finding) cons
 
 MarkStatus PatternSearcher::judge(const PatternFit& fit, const MarkFinding& finding) const {
   if (fit.correlation < alike) return MarkStatus::no_candidate;
-  if (stands_out(fit) && fit.correlation > much_alike) return MarkStatus::cut_off;
   if (fit.saturated_share > saturated_share) return MarkStatus::saturated;
+  if (stands_out(fit) && fit.correlation > much_alike) return MarkStatus::cut_off;
   if (!fit.converged) return MarkStatus::not_converged;
   if (finding.contrast < search_.min_contrast) return MarkStatus::low_contrast;
   const double scale = scale_of(fit.warp), turn = angle_between(finding.direction_rad, search_.direction_rad);
@@ -243,7 +247,7 @@ MarkFinding PatternSearcher::run() {
   MarkFinding best = finding_with(MarkStatus::no_candidate);
   bool ambiguous = false;
   for (const PatternCandidate& candidate : candidates()) {
-    if (candidate.correlation < promising && best.status == MarkStatus::found) break;
+    if (candidate.correlation < rival_promising && best.status == MarkStatus::found) break;
     const MarkFinding finding = measured(candidate, level);
     ambiguous = ambiguous || (finding.status == MarkStatus::found && best.status == MarkStatus::found &&
                               rivals(finding, best));

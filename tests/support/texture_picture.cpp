@@ -13,11 +13,14 @@ constexpr double edge_width = 0.4;  // two samples: the area of a sharp figure c
 
 double covered(double inside) { return std::clamp(inside / edge_width + 0.5, 0.0, 1.0); }
 
-double value_of(const TextureFeature& f, const Eigen::Vector2d& x) {
-  const Eigen::Vector2d off = x - f.at;
-  if (f.shape == TextureFeature::spot) return f.grey * std::exp(-0.5 * off.squaredNorm() / (f.size * f.size));
-  if (f.shape == TextureFeature::plate) return f.grey * covered(f.size - off.norm());
-  const double c = std::cos(f.angle_rad), s = std::sin(f.angle_rad);
+// c, s: direction of a bar.
+double value_of(const TextureFeature& f, const Eigen::Vector2d& off, double c, double s) {
+  const double square = off.squaredNorm();
+  if (f.shape == TextureFeature::spot) {
+    const double t = 0.5 * square / (f.size * f.size);
+    return t < 10 ? f.grey * std::exp(-t) : 0;
+  }
+  if (f.shape == TextureFeature::plate) return f.grey * covered(f.size - std::sqrt(square));
   return f.grey * covered(f.size - std::abs(c * off.x() + s * off.y())) *
          covered(f.width - std::abs(c * off.y() - s * off.x()));
 }
@@ -40,17 +43,19 @@ struct FineGrid {
 
 void add_feature(const TextureFeature& f, const TextureLook& look, FineGrid& grid) {
   const Eigen::Vector2d middle = look.place_px + look.linear * f.at;
-  const double reach = reach_of(f) * look.linear.norm();
-  const int i0 = std::max(0, grid.sample(middle.x() - reach)),
-            j0 = std::max(0, grid.sample(middle.y() - reach));
-  const int i1 = std::min(grid.width - 1, grid.sample(middle.x() + reach));
-  const int j1 = std::min(grid.height - 1, grid.sample(middle.y() + reach));
+  const double reach = reach_of(f);
+  const double across = reach * look.linear.row(0).norm(), down = reach * look.linear.row(1).norm();
+  const int i0 = std::max(0, grid.sample(middle.x() - across)),
+            j0 = std::max(0, grid.sample(middle.y() - down));
+  const int i1 = std::min(grid.width - 1, grid.sample(middle.x() + across));
+  const int j1 = std::min(grid.height - 1, grid.sample(middle.y() + down));
   const Eigen::Matrix2d back = look.linear.inverse();
+  const double c = std::cos(f.angle_rad), s = std::sin(f.angle_rad);
   for (int j = j0; j <= j1; ++j) {
     for (int i = i0; i <= i1; ++i) {
-      const Eigen::Vector2d x = back * (Eigen::Vector2d(grid.place(i), grid.place(j)) - look.place_px);
+      const Eigen::Vector2d off = back * (Eigen::Vector2d(grid.place(i), grid.place(j)) - middle);
       grid.grey[static_cast<std::size_t>(j) * static_cast<std::size_t>(grid.width) +
-                static_cast<std::size_t>(i)] += value_of(f, x);
+                static_cast<std::size_t>(i)] += value_of(f, off, c, s);
     }
   }
 }
