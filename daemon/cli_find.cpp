@@ -29,7 +29,7 @@ struct Options {
   std::vector<double> window, click, inner;
   double min_diameter = 8, max_diameter = 0, direction = 0, direction_tolerance = 180, opening = 90;
   MarkSearch search;
-  bool json = false;
+  bool dark = true, json = false;
 };
 
 constexpr std::array kinds{std::pair{"circle", MarkKind::disc},     std::pair{"disc", MarkKind::disc},
@@ -155,7 +155,7 @@ void add_options(CLI::App& verb, Options& options) {
       ->required();
   verb.add_option("--kind", options.kind, "what to look for (circle)")->check(CLI::IsMember(words));
   auto* bright = verb.add_flag("--bright", options.search.bright, "brighter than what surrounds it");
-  verb.add_flag("--dark", "darker than what surrounds it (default)")->excludes(bright);
+  verb.add_flag("--dark", options.dark, "darker than what surrounds it (default)")->excludes(bright);
   verb.add_option("--window", options.window, "x,y,w,h: first column and row, width and height, px")
       ->delimiter(',')
       ->expected(4);

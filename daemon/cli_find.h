@@ -1,7 +1,7 @@
-// zeropose find: marks in a picture.
+// The verb find: marks in a picture (spec 92).
 #pragma once
 
-#include <CLI/App.hpp>
+#include <CLI/CLI.hpp>
 
 namespace zeropose {
 

@@ -5,6 +5,7 @@
 
 #include "measure/disc_search.h"
 #include "measure/edge_marks.h"
+#include "measure/pattern_search.h"
 #include "measure/ring_search.h"
 
 namespace zeropose {
@@ -79,7 +80,7 @@ MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wan
     case MarkKind::edge:
       return sight_of_one(find_edge(image, search));
     case MarkKind::pattern:
-      break;
+      return sight_of_one(find_pattern(image, search));
   }
   return {};
 }
