@@ -36,6 +36,15 @@ void to_coefficients(float* c, int n, std::ptrdiff_t step, int lanes, std::ptrdi
 
 constexpr int lanes_at_once = 8;
 
+using Four = Eigen::Array4f;
+
+// Of the four coefficients about a place t behind the second of them.
+inline Four weights_of(float t) {
+  const Four constant(1.0F / 6, 2.0F / 3, 1.0F / 6, 0), linear(-0.5F, 0, 0.5F, 0);
+  const Four square(0.5F, -1, 0.5F, 0), cube(-1.0F / 6, 0.5F, -0.5F, 1.0F / 6);
+  return constant + t * (linear + t * (square + t * cube));
+}
+
 }  // namespace
 
 GreyField part_of(const GreyField& field, const PixelWindow& window) {
@@ -97,6 +106,23 @@ GreySpline::GreySpline(const GreyField& field)
                     stride_, across);
   }
   to_coefficients(first - 1, height_, stride_, stride_, 1, down);
+}
+
+void GreySpline::line(float u, float v, float du, float dv, int count, float* greys) const {
+  using Coefficients = Eigen::Map<const Four>;
+  const int last_i = width_ - 2, last_j = height_ - 2;
+  const std::ptrdiff_t stride = stride_;
+  const float* const coefficients = coefficients_.data();
+  for (int k = 0; k < count; ++k) {
+    const float x = u + static_cast<float>(k) * du, y = v + static_cast<float>(k) * dv;
+    const int i = std::min(static_cast<int>(x), last_i), j = std::min(static_cast<int>(y), last_j);
+    const Four across = weights_of(x - static_cast<float>(i)), down = weights_of(y - static_cast<float>(j));
+    const float* const first = coefficients + j * stride + i;
+    const Four sum =
+        down(0) * Coefficients(first) + down(1) * Coefficients(first + stride) +
+        (down(2) * Coefficients(first + 2 * stride) + down(3) * Coefficients(first + 3 * stride));
+    greys[k] = (across * sum).sum();
+  }
 }
 
 GreySlopes slopes_of(const GreyField& field) {

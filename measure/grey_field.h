@@ -3,7 +3,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <vector>
 
 #include "measure/image.h"
@@ -42,27 +41,15 @@ class GreySpline {
 
   // Precondition: holds(u, v).
   float at(float u, float v) const {
-    const int i = std::min(static_cast<int>(u), width_ - 2), j = std::min(static_cast<int>(v), height_ - 2);
-    const Weights across = weights_of(u - static_cast<float>(i)),
-                  down = weights_of(v - static_cast<float>(j));
-    const float* const first = coefficients_.data() + std::ptrdiff_t{j} * stride_ + i;
-    const Eigen::Array4f sum = down(0) * Four(first) + down(1) * Four(first + stride_) +
-                               down(2) * Four(first + 2 * stride_) + down(3) * Four(first + 3 * stride_);
-    return (across * sum).sum();
+    float grey;
+    line(u, v, 0, 0, 1, &grey);
+    return grey;
   }
+
+  // Values at count places a step (du, dv) from each other. Precondition: holds them all.
+  void line(float u, float v, float du, float dv, int count, float* greys) const;
 
  private:
-  using Weights = Eigen::Array4f;
-  using Four = Eigen::Map<const Eigen::Array4f>;
-
-  // Of the four coefficients about a place t behind the second of them.
-  static Weights weights_of(float t) {
-    constexpr float third = 1.0F / 3, sixth = 1.0F / 6;
-    return Weights(sixth, 2 * third, sixth, 0) +
-           t * (Weights(-0.5F, 0, 0.5F, 0) +
-                t * (Weights(0.5F, -1, 0.5F, 0) + t * Weights(-sixth, 0.5F, -0.5F, sixth)));
-  }
-
   int width_, height_, stride_;
   std::vector<float> coefficients_;  // one more on every side
 };

@@ -31,6 +31,14 @@ double interpolated_noise(double t) {
   return 1 + 0.1095 * q - 4.3127 * q * q;
 }
 
+Eigen::Map<Eigen::ArrayXf> array_of(std::vector<float>& values) {
+  return {values.data(), Eigen::Index(values.size())};
+}
+
+Eigen::Map<const Eigen::ArrayXf> array_of(const std::vector<float>& values) {
+  return {values.data(), Eigen::Index(values.size())};
+}
+
 // What of a field is image.
 struct SeenPart {
   double u0 = 0, v0 = 0, u1 = 0, v1 = 0;  // px
@@ -63,8 +71,6 @@ class Match {
   void residuals();
   void find_scale();
   void weigh();
-  double sum_of_weights() const { return Eigen::Map<const Eigen::ArrayXf>(weight_.data(), size()).sum(); }
-  Eigen::Index size() const { return Eigen::Index(p_.size()); }
   bool begin();
   MatchMatrix information() const;
   MatchMatrix prior() const;
@@ -101,9 +107,7 @@ void Match::sample_row(int j) {
   const std::size_t begin = std::size_t(j) * std::size_t(p_.stride);
   const auto u0 = float(first.x()), v0 = float(first.y()), du = float(along.x()), dv = float(along.y());
   if (row_inside(first, first + along * (p_.width - 1))) {
-    for (int i = 0; i < p_.width; ++i) {
-      grey_[begin + std::size_t(i)] = spline_.at(u0 + float(i) * du, v0 + float(i) * dv);
-    }
+    spline_.line(u0, v0, du, dv, p_.width, grey_.data() + begin);
     std::fill_n(valid_.begin() + std::ptrdiff_t(begin), p_.width, 1.0F);
     seen_count_ += p_.width;
     return;
@@ -129,22 +133,20 @@ void Match::sample() {
 
 // Gain and offset under the weights.
 bool Match::regress() {
-  double w = 0, t = 0, i = 0, tt = 0, ti = 0;
-  for (std::size_t k = 0; k < p_.size(); ++k) {
-    const double weight = double{weight_[k]}, patch = double{p_.grey[k]}, image = double{grey_[k]};
-    w += weight, t += weight * patch, i += weight * image;
-    tt += weight * patch * patch, ti += weight * patch * image;
-  }
-  const double variance = tt - t * t / w;
+  const auto weights = array_of(weight_), image = array_of(grey_);
+  const auto patch = array_of(p_.grey);
+  const double w = double{weights.sum()}, t = double{(weights * patch).sum()},
+               i = double{(weights * image).sum()};
+  const double variance = double{(weights * patch.square()).sum()} - t * t / w;
   if (!(w > least_share * p_.area()) || !(variance > 0)) return false;
-  gain_ = (ti - t * i / w) / variance;
+  gain_ = (double{(weights * patch * image).sum()} - t * i / w) / variance;
   offset_ = (i - gain_ * t) / w;
   return true;
 }
 
 void Match::residuals() {
-  const auto g = float(gain_), o = float(offset_);
-  for (std::size_t k = 0; k < p_.size(); ++k) residual_[k] = valid_[k] * (grey_[k] - g * p_.grey[k] - o);
+  array_of(residual_) =
+      array_of(valid_) * (array_of(grey_) - float(gain_) * array_of(p_.grey) - float(offset_));
 }
 
 // Sigma from the middle one of some of the residuals' sizes.
@@ -164,17 +166,15 @@ void Match::find_scale() {
 void Match::weigh() {
   const auto by_scale = float(1 / (scale_ * double{no_weight_sigmas - full_weight_sigmas}));
   constexpr float from = no_weight_sigmas / (no_weight_sigmas - full_weight_sigmas);
-  for (std::size_t k = 0; k < p_.size(); ++k) {
-    weight_[k] = valid_[k] * std::min(1.0F, std::max(0.0F, from - by_scale * std::abs(residual_[k])));
-  }
-  used_ = sum_of_weights();
+  array_of(weight_) = array_of(valid_) * (from - by_scale * array_of(residual_).abs()).max(0.0F).min(1.0F);
+  used_ = double{array_of(weight_).sum()};
 }
 
 // Gain and offset from scratch, without what is covered.
 bool Match::begin() {
   sample();
   weight_ = valid_;
-  for (int round = 0; round < 3; ++round) {
+  for (int round = 0; round < 2; ++round) {
     if (!regress()) return false;
     residuals();
     find_scale();
@@ -213,7 +213,7 @@ MatchMatrix Match::information() const {
 // False: cannot go on.
 bool Match::step() {
   if (!(gain_ > 0) || used_ < least_share * p_.area()) return false;
-  for (std::size_t k = 0; k < p_.size(); ++k) weighted_[k] = weight_[k] * residual_[k];
+  array_of(weighted_) = array_of(weight_) * array_of(residual_);
   const MatchMatrix N = information() + prior();
   const SmallCholesky<match_unknowns> solver(N);
   if (!solver.ok()) return false;
