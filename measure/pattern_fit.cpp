@@ -378,19 +378,6 @@ PatternFit match_in(const PatternLevel& level, int width, int height, const Part
 
 }  // namespace
 
-double rotation_of(const PatternWarp& warp) {
-  return std::atan2(warp.linear(1, 0) - warp.linear(0, 1), warp.linear(0, 0) + warp.linear(1, 1));
-}
-
-double scale_of(const PatternWarp& warp) { return std::sqrt(std::abs(warp.linear.determinant())); }
-
-double squeeze_of(const PatternWarp& warp) {
-  const Matrix2d& A = warp.linear;
-  const double like = std::hypot(A(0, 0) + A(1, 1), A(1, 0) - A(0, 1));
-  const double unlike = std::hypot(A(0, 0) - A(1, 1), A(1, 0) + A(0, 1));
-  return like + unlike > 0 ? (like - unlike) / (like + unlike) : 0;
-}
-
 PatternFit match_level(const PatternLevel& level, const GreyField& field, const PatternWarp& start,
                        double noise_grey, const MatchLimits& limits) {
   const auto part = [&field](const PixelWindow& window) { return part_of(field, window); };
@@ -401,26 +388,6 @@ PatternFit fit_pattern(const ImageView& image, const Pattern& pattern, const Pat
                        const PatternWarp& start, const MatchLimits& limits) {
   const auto part = [&image](const PixelWindow& window) { return field_of(image, window); };
   return match_in(level, image.width_px, image.height_px, part, start, pattern.noise_grey, limits);
-}
-
-GreyField field_of(const Pattern& pattern) { return {pattern.width_px, pattern.height_px, pattern.greys}; }
-
-namespace {
-
-Vector2d from_middle(const Pattern& pattern) {
-  return pattern.clicked_px - 0.5 * Vector2d(pattern.width_px - 1, pattern.height_px - 1);
-}
-
-}  // namespace
-
-Vector2d clicked_place(const Pattern& pattern, const PatternFit& fit) {
-  return fit.warp.middle_px + fit.warp.linear * from_middle(pattern);
-}
-
-Matrix2d clicked_covariance(const Pattern& pattern, const PatternFit& fit) {
-  const Eigen::Matrix<double, 2, match_unknowns> M = fit.warp.linear * motion_of(from_middle(pattern));
-  const Matrix2d C = M * fit.covariance * M.transpose();
-  return 0.5 * (C + C.transpose());
 }
 
 }  // namespace zeropose

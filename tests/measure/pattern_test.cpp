@@ -1,4 +1,4 @@
-// Taught patterns: laws, accuracy, and a reason for everything that is not found (spec 50 M0, 88).
+// Taught patterns: laws, accuracy, and what cannot be taught (spec 50 M0, 88).
 #include "measure/pattern.h"
 
 #include <gtest/gtest.h>
@@ -7,105 +7,14 @@
 #include <cmath>
 #include <numbers>
 
-#include "measure/pattern_search.h"
-#include "tests/support/texture_picture.h"
+#include "tests/measure/pattern_scene.h"
 
 namespace zeropose {
 namespace {
 
+using namespace zeropose::test;
 using Eigen::Matrix2d;
 using Eigen::Vector2d;
-using test::expose;
-using test::paint_texture;
-using test::Picture;
-using test::Pixels;
-using test::Texture;
-using test::TextureLook;
-
-constexpr double noise = 2;
-constexpr int patch_px = 41, teach_size = 61, scene_size = 110;
-const PixelWindow patch_window{10, 10, 50, 50};
-const Vector2d patch_middle(30, 30), scene_middle(54.5, 54.5);
-
-// The picture that is taught and one in which the pattern is searched.
-struct Scene {
-  Texture texture;
-  TextureLook taught, seen;
-
-  Vector2d truth(const Vector2d& clicked_px) const {
-    return seen.place_px + seen.linear * (clicked_px - taught.place_px);
-  }
-  Picture taught_picture() const { return paint_texture(texture, taught, teach_size, teach_size); }
-  Picture seen_picture() const { return paint_texture(texture, seen, scene_size, scene_size); }
-};
-
-Matrix2d turned(double angle, double scale = 1, double shear = 0) {
-  Matrix2d R, S;
-  R << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
-  S << scale, shear, 0, scale;
-  return R * S;
-}
-
-// +-2 degrees, +-2 % scale and shear, +-20 % gain, +-10 grey levels, +-spread px.
-Scene random_scene(std::uint64_t seed, double spread_px = 5, double contrast = 1) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> unit(-1, 1);
-  Scene scene{test::random_texture(34, seed, contrast), {}, {}};
-  scene.taught.place_px = patch_middle + 0.5 * Vector2d(unit(random), unit(random));
-  scene.seen.place_px = scene_middle + spread_px * Vector2d(unit(random), unit(random));
-  const double angle = unit(random) * 2 * std::numbers::pi / 180;
-  scene.seen.linear = turned(angle, 1 + 0.02 * unit(random), 0.02 * unit(random));
-  scene.seen.gain = 1 + 0.2 * unit(random);
-  scene.seen.offset_grey = 10 * unit(random);
-  return scene;
-}
-
-Pattern teach(const Pixels& pixels, const Vector2d& clicked_px = patch_middle) {
-  return teach_pattern(pixels.view(), patch_window, clicked_px);
-}
-
-MarkSearch search_for(const Pattern& pattern, const Vector2d& expected_px = scene_middle,
-                      double half_px = 40) {
-  MarkSearch search;
-  search.kind = MarkKind::pattern;
-  search.expected_px = expected_px;
-  search.half_window_px = {half_px, half_px};
-  search.min_contrast = 5;
-  search.pattern = &pattern;
-  return search;
-}
-
-MarkFinding find(const Pixels& pixels, const Pattern& pattern) {
-  return find_pattern(pixels.view(), search_for(pattern));
-}
-
-Picture cut(const Picture& picture, int u0, int v0, int width, int height) {
-  Picture part{width, height, {}};
-  for (int v = v0; v < v0 + height; ++v) {
-    for (int u = u0; u < u0 + width; ++u) {
-      part.grey.push_back(picture.grey[static_cast<std::size_t>(v * picture.width_px + u)]);
-    }
-  }
-  return part;
-}
-
-void fill(Picture& picture, double u0, double v0, double u1, double v1, double grey) {
-  for (int v = 0; v < picture.height_px; ++v) {
-    for (int u = 0; u < picture.width_px; ++u) {
-      if (u < u0 || u > u1 || v < v0 || v > v1) continue;
-      picture.grey[static_cast<std::size_t>(v * picture.width_px + u)] = grey;
-    }
-  }
-}
-
-void paste(const Picture& part, int u0, int v0, Picture& picture) {
-  for (int v = 0; v < part.height_px; ++v) {
-    for (int u = 0; u < part.width_px; ++u) {
-      picture.grey[static_cast<std::size_t>((v0 + v) * picture.width_px + u0 + u)] =
-          part.grey[static_cast<std::size_t>(v * part.width_px + u)];
-    }
-  }
-}
 
 // Without noise the same pixels elsewhere: nothing is left but the stop of the iteration, 0.03 sigma of a
 // place known to 0.002 px (sigma of rounding by slopes of 10 grey levels per px over 1500 pixels).
@@ -124,7 +33,7 @@ TEST(PatternLaw, WholePixelShiftShiftsByWholePixels) {
 
 TEST(PatternLaw, GainAndOffsetDoNotMoveThePlace) {
   std::mt19937_64 random(2);
-  Scene scene = random_scene(12);
+  PatternScene scene = random_scene(12);
   const Pattern pattern = teach(expose(scene.taught_picture(), 0, random));
   scene.seen.gain = 1;
   scene.seen.offset_grey = 0;
@@ -141,7 +50,7 @@ TEST(PatternLaw, GainAndOffsetDoNotMoveThePlace) {
 
 TEST(PatternLaw, TwoBytesPerPixelAgreeWithOne) {
   std::mt19937_64 random(3);
-  const Scene scene = random_scene(13);
+  const PatternScene scene = random_scene(13);
   const Pixels taught = expose(scene.taught_picture(), noise, random);
   const Pixels seen = expose(scene.seen_picture(), noise, random);
   std::vector<std::uint16_t> wide;
@@ -160,7 +69,7 @@ TEST(PatternLaw, TwoBytesPerPixelAgreeWithOne) {
 // One match, several clicked points: they move as one piece.
 TEST(PatternLaw, ThePointMayLieAnywhereInOrNearThePatch) {
   std::mt19937_64 random(4);
-  const Scene scene = random_scene(14);
+  const PatternScene scene = random_scene(14);
   const Pixels taught = expose(scene.taught_picture(), noise, random);
   const Pixels seen = expose(scene.seen_picture(), noise, random);
   for (const Vector2d& clicked :
@@ -177,7 +86,7 @@ TEST(PatternLaw, ThePointMayLieAnywhereInOrNearThePatch) {
 
 TEST(PatternLaw, RotationAndScaleAreMeasured) {
   std::mt19937_64 random(5);
-  Scene scene = random_scene(15);
+  PatternScene scene = random_scene(15);
   scene.seen.linear = turned(0.05, 1.03);
   const Pattern pattern = teach(expose(scene.taught_picture(), noise, random));
   const MarkFinding found = find(expose(scene.seen_picture(), noise, random), pattern);
@@ -190,7 +99,7 @@ TEST(PatternLaw, RotationAndScaleAreMeasured) {
 
 // Cramer-Rao bound of the clicked point from the pictures: differences in the eight unknowns of the true map;
 // the noise of the taught picture counts times the gain.
-Matrix2d bound_of(const Scene& scene) {
+Matrix2d bound_of(const PatternScene& scene) {
   Eigen::Matrix<double, 8, 8> N = Eigen::Matrix<double, 8, 8>::Zero();
   const Vector2d truth = scene.truth(patch_middle), from_place = patch_middle - scene.taught.place_px;
   std::vector<Picture> slopes;
@@ -198,7 +107,7 @@ Matrix2d bound_of(const Scene& scene) {
     const double h = k < 2 ? 0.01 : 5e-4;
     Picture difference;
     for (const double sign : {1.0, -1.0}) {
-      Scene moved = scene;
+      PatternScene moved = scene;
       Vector2d place = truth;
       if (k < 2) place(k) += sign * h;
       if (k >= 2) moved.seen.linear((k - 2) / 2, (k - 2) % 2) += sign * h;
@@ -234,7 +143,7 @@ TEST(PatternAccuracy, NearTheBoundWithHonestCovariance) {
   std::mt19937_64 random(6);
   double squares = 0, bound = 0, held = 0, count = 0;
   for (std::uint64_t seed = 100; seed < 108; ++seed) {
-    const Scene scene = random_scene(seed);
+    const PatternScene scene = random_scene(seed);
     const Picture taught = scene.taught_picture(), seen = scene.seen_picture();
     bound += bound_of(scene).trace() * 50;
     for (int draw = 0; draw < 50; ++draw) {
@@ -257,7 +166,7 @@ TEST(PatternCover, AFifthCoveredIsMeasuredOrRefused) {
   std::mt19937_64 random(7);
   int found_count = 0;
   for (std::uint64_t seed = 200; seed < 216; ++seed) {
-    const Scene scene = random_scene(seed);
+    const PatternScene scene = random_scene(seed);
     const Pattern pattern = teach(expose(scene.taught_picture(), noise, random));
     Picture picture = scene.seen_picture();
     const Vector2d at = scene.truth(patch_middle);
@@ -277,7 +186,7 @@ TEST(PatternCover, AFifthCoveredIsMeasuredOrRefused) {
 
 TEST(PatternBlur, ALittleIsMeasuredMuchIsRefused) {
   std::mt19937_64 random(8);
-  Scene scene = random_scene(17);
+  PatternScene scene = random_scene(17);
   const Pattern pattern = teach(expose(scene.taught_picture(), noise, random));
   scene.seen.blur_sigma_px = 1;
   const MarkFinding soft = find(expose(scene.seen_picture(), noise, random), pattern);
@@ -288,89 +197,6 @@ TEST(PatternBlur, ALittleIsMeasuredMuchIsRefused) {
   EXPECT_EQ(find(expose(scene.seen_picture(), noise, random), pattern).status, MarkStatus::blurred);
 }
 
-TEST(PatternReason, TwoOfThemAreAmbiguous) {
-  std::mt19937_64 random(9);
-  Scene scene = random_scene(18);
-  const Pattern pattern = teach(expose(scene.taught_picture(), noise, random));
-  const Picture one = cut(scene.taught_picture(), 8, 8, 45, 45);
-  Picture two{140, 100, std::vector<double>(140 * 100, 115.0)};
-  paste(one, 15, 20, two);
-  MarkSearch search = search_for(pattern, {69.5, 49.5});
-  search.half_window_px = {68, 48};
-  EXPECT_EQ(find_pattern(expose(two, noise, random).view(), search).status, MarkStatus::found);
-  paste(one, 80, 35, two);
-  EXPECT_EQ(find_pattern(expose(two, noise, random).view(), search).status, MarkStatus::ambiguous);
-}
-
-struct OneScene {
-  std::mt19937_64 random{10};
-  Scene scene = random_scene(19);
-  Pattern pattern = teach(expose(scene.taught_picture(), noise, random));
-  Picture picture = scene.seen_picture();
-
-  MarkStatus status(const MarkSearch& search) {
-    return find_pattern(expose(picture, noise, random).view(), search).status;
-  }
-};
-
-TEST(PatternReason, SearchesThatMakeNoSenseAreNotSearched) {
-  OneScene one;
-  MarkSearch search = search_for(one.pattern);
-  ASSERT_EQ(one.status(search), MarkStatus::found);
-  search.pattern = nullptr;
-  EXPECT_EQ(one.status(search), MarkStatus::not_searched);
-  const Pattern never;
-  EXPECT_EQ(one.status(search_for(never)), MarkStatus::not_searched);
-  EXPECT_EQ(one.status(search_for(one.pattern, {NAN, 0})), MarkStatus::not_searched);
-}
-
-TEST(PatternReason, BesideTheImageOrCutOff) {
-  OneScene one;
-  EXPECT_EQ(one.status(search_for(one.pattern, {-300, 50})), MarkStatus::outside_image);
-  EXPECT_EQ(find_pattern(ImageView{}, search_for(one.pattern)).status, MarkStatus::outside_image);
-  EXPECT_EQ(one.status(search_for(one.pattern, scene_middle, 15)), MarkStatus::cut_off);
-  const Vector2d at = one.scene.truth(patch_middle);
-  EXPECT_EQ(one.status(search_for(one.pattern, at + Vector2d(7, 0), 22)), MarkStatus::cut_off);
-  const auto first = static_cast<int>(at.x()) - 14;
-  one.picture = cut(one.picture, first, 0, scene_size - first, scene_size);
-  EXPECT_EQ(one.status(search_for(one.pattern, at - Vector2d(first, 0), 45)), MarkStatus::cut_off);
-}
-
-TEST(PatternReason, NothingLikeIt) {
-  OneScene one;
-  fill(one.picture, 0, 0, scene_size, scene_size, 120);
-  EXPECT_EQ(one.status(search_for(one.pattern)), MarkStatus::no_candidate);
-  int found = 0;
-  for (std::uint64_t seed = 300; seed < 310; ++seed) {
-    one.picture = random_scene(seed).seen_picture();
-    found += one.status(search_for(one.pattern)) == MarkStatus::found ? 1 : 0;
-  }
-  EXPECT_EQ(found, 0);
-}
-
-TEST(PatternReason, TooFaintTooLightTooSmallTooFarTurned) {
-  OneScene one;
-  MarkSearch search = search_for(one.pattern);
-  search.min_contrast = 2 * one.pattern.contrast;
-  EXPECT_EQ(one.status(search), MarkStatus::low_contrast);
-  search = search_for(one.pattern);
-  Picture light = one.picture;
-  for (double& grey : light.grey) grey = 2.5 * grey - 20;
-  one.picture = light;
-  EXPECT_EQ(one.status(search), MarkStatus::saturated);
-  one.scene.seen.linear = turned(0, 0.84);
-  one.picture = one.scene.seen_picture();
-  EXPECT_EQ(one.status(search), MarkStatus::too_small);
-  one.scene.seen.linear = turned(0.6);
-  one.picture = one.scene.seen_picture();
-  EXPECT_NE(one.status(search), MarkStatus::found);
-  search.direction_rad = 0.6;
-  EXPECT_EQ(one.status(search), MarkStatus::found);
-  search.direction_rad = 0;
-  search.direction_tolerance_rad = 0.7;
-  EXPECT_EQ(one.status(search), MarkStatus::found);
-}
-
 PatternStatus taught_status(const Picture& picture, const PixelWindow& window = patch_window,
                             const Vector2d& clicked_px = patch_middle) {
   std::mt19937_64 random(20);
@@ -378,9 +204,9 @@ PatternStatus taught_status(const Picture& picture, const PixelWindow& window = 
 }
 
 Picture bars(bool both) {
-  test::Drawing drawing;
+  Drawing drawing;
   drawing.width_px = drawing.height_px = teach_size;
-  test::Figure bar;
+  Figure bar;
   bar.corners_px = {{24, -20}, {33, -20}, {40, 80}, {31, 80}};
   bar.grey = 60;
   drawing.figures = {bar};
@@ -388,7 +214,7 @@ Picture bars(bool both) {
     bar.corners_px = {{-20, 24}, {80, 31}, {80, 38}, {-20, 31}};
     drawing.figures.push_back(bar);
   }
-  return test::paint(drawing);
+  return paint(drawing);
 }
 
 TEST(PatternTeach, RefusesWhatCannotBePlaced) {
