@@ -151,7 +151,7 @@ void Match::residuals() {
 
 // Sigma from the middle one of some of the residuals' sizes.
 void Match::find_scale() {
-  const std::size_t every = std::max<std::size_t>(1, p_.size() / 350) | 1;
+  const std::size_t every = std::max<std::size_t>(1, p_.size() / 200) | 1;
   sizes_.clear();
   for (std::size_t k = 0; k < p_.size(); k += every) {
     if (valid_[k] > 0) sizes_.push_back(std::abs(residual_[k]));
