@@ -10,6 +10,8 @@
 namespace zeropose {
 namespace {
 
+constexpr double least_rise = 10;  // grey levels over an edge
+
 constexpr std::pair<std::string_view, int> dictionaries[] = {
     {"4x4_50", cv::aruco::DICT_4X4_50},           {"4x4_100", cv::aruco::DICT_4X4_100},
     {"4x4_250", cv::aruco::DICT_4X4_250},         {"4x4_1000", cv::aruco::DICT_4X4_1000},
@@ -44,10 +46,68 @@ cv::Mat bytes_of(const ImageView& image) {
 
 double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-CodedMark mark_of(int id, const std::vector<cv::Point2f>& corners) {
+double grey_between(const ImageView& image, const Eigen::Vector2d& at) {
+  const int u = std::clamp(static_cast<int>(at.x()), 0, image.width_px - 2);
+  const int v = std::clamp(static_cast<int>(at.y()), 0, image.height_px - 2);
+  const double x = at.x() - u, y = at.y() - v;
+  return (1 - y) * ((1 - x) * image.grey_at(u, v) + x * image.grey_at(u + 1, v)) +
+         y * ((1 - x) * image.grey_at(u, v + 1) + x * image.grey_at(u + 1, v + 1));
+}
+
+// How far outside of a place the black ends: the mean of the rises of grey along the normal, within reach. 0
+// where there is no clear edge.
+double edge_offset(const ImageView& image, const Eigen::Vector2d& at, const Eigen::Vector2d& outwards,
+                   double reach) {
+  constexpr int steps = 16;
+  double weights = 0, sum = 0, before = grey_between(image, at - reach * outwards);
+  for (int k = 1; k <= steps; ++k) {
+    const double here = grey_between(image, at + reach * (2.0 * k / steps - 1) * outwards);
+    const double rise = here - before;
+    weights += rise;
+    sum += rise * reach * (2 * (k - 0.5) / steps - 1);
+    before = here;
+  }
+  return weights > least_rise ? std::clamp(sum / weights, -reach, reach) : 0;
+}
+
+// A side of the square by the places where the black ends: a point of it and its direction.
+struct CodedMarkSide {
+  Eigen::Vector2d at, along;
+};
+
+CodedMarkSide side_of(const ImageView& image, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  const Eigen::Vector2d along = (to - from).normalized(), outwards(along.y(), -along.x());
+  const double length = (to - from).norm(), reach = std::min(3.0, 0.06 * length);
+  double n = 0, x1 = 0, y1 = 0, xx = 0, xy = 0;
+  for (double share = 0.12; share < 0.885; share += 1 / std::max(16.0, length)) {
+    const double x = (share - 0.5) * length;
+    const double y = edge_offset(image, from + share * (to - from), outwards, reach);
+    n += 1, x1 += x, y1 += y, xx += x * x, xy += x * y;
+  }
+  const double slope = (xy - x1 * y1 / n) / (xx - x1 * x1 / n);
+  const Eigen::Vector2d middle = 0.5 * (from + to) + (y1 - slope * x1) / n * outwards;
+  return {middle, along + slope * outwards};
+}
+
+// Corners where the sides meet; those that would move by more than a pixel and a half stay.
+void refine(const ImageView& image, std::array<Eigen::Vector2d, 4>& corners) {
+  for (int round = 0; round < 2; ++round) {
+    std::array<CodedMarkSide, 4> sides;
+    for (std::size_t k = 0; k < 4; ++k) sides[k] = side_of(image, corners[k], corners[(k + 1) % 4]);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const CodedMarkSide &one = sides[k], &other = sides[(k + 3) % 4];
+      const double t = cross(other.at - one.at, other.along) / cross(one.along, other.along);
+      const Eigen::Vector2d corner = one.at + t * one.along;
+      if ((corner - corners[k]).norm() < 1.5) corners[k] = corner;
+    }
+  }
+}
+
+CodedMark mark_of(const ImageView& image, int id, const std::vector<cv::Point2f>& corners) {
   CodedMark mark;
   mark.id = id;
   for (std::size_t k = 0; k < 4; ++k) mark.corners_px[k] = {double{corners[k].x}, double{corners[k].y}};
+  refine(image, mark.corners_px);
   const auto& c = mark.corners_px;
   const Eigen::Vector2d one = c[2] - c[0], other = c[3] - c[1];
   const double t = cross(c[1] - c[0], other) / cross(one, other);
@@ -76,7 +136,7 @@ std::vector<CodedMark> coded_marks(const ImageView& image, std::string_view dict
   } catch (const cv::Exception&) {  // what it cannot work with has no marks for us
     return {};
   }
-  for (std::size_t k = 0; k < ids.size(); ++k) marks.push_back(mark_of(ids[k], corners[k]));
+  for (std::size_t k = 0; k < ids.size(); ++k) marks.push_back(mark_of(image, ids[k], corners[k]));
   std::sort(marks.begin(), marks.end(), [](const CodedMark& a, const CodedMark& b) {
     return std::make_tuple(a.id, a.centre_px.y(), a.centre_px.x()) <
            std::make_tuple(b.id, b.centre_px.y(), b.centre_px.x());

@@ -23,8 +23,8 @@ struct CodedMark {
 // Names as "tag36h11", "tag25h9", "tag16h5", "4x4_50" .. "7x7_1000", "original".
 bool is_code_dictionary(std::string_view name);
 
-// By ascending number, then by place; a number may occur twice. Corners are refined on the picture's
-// gradients, to a tenth of a pixel or so. Empty for an unknown dictionary or an empty image.
+// By ascending number, then by place; a number may occur twice. Corners are where straight lines through the
+// four gradients, to a tenth of a pixel or so. Empty for an unknown dictionary or an empty image.
 std::vector<CodedMark> coded_marks(const ImageView& image, std::string_view dictionary);
 
 }  // namespace zeropose
