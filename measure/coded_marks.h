@@ -24,7 +24,7 @@ struct CodedMark {
 bool is_code_dictionary(std::string_view name);
 
 // By ascending number, then by place; a number may occur twice. Corners are where straight lines through the
-// four gradients, to a tenth of a pixel or so. Empty for an unknown dictionary or an empty image.
+// four edges meet. Empty for an unknown dictionary or an image below 16 x 16 px.
 std::vector<CodedMark> coded_marks(const ImageView& image, std::string_view dictionary);
 
 }  // namespace zeropose

@@ -40,14 +40,14 @@ Eigen::Map<const Eigen::ArrayXf> array_of(const std::vector<float>& values) {
 }
 
 // What of a field is image.
-struct SeenPart {
+struct SeenOfField {
   double u0 = 0, v0 = 0, u1 = 0, v1 = 0;  // px
 };
 
 // One match under way.
 class Match {
  public:
-  Match(const PatternLevel& level, GreySpline spline, const GreyField& field, const SeenPart& seen,
+  Match(const PatternLevel& level, GreySpline spline, const GreyField& field, const SeenOfField& seen,
         const PatternWarp& start, double noise_grey)
       : p_(level),
         spline_(std::move(spline)),
@@ -86,7 +86,7 @@ class Match {
   const PatternLevel& p_;
   GreySpline spline_;
   const GreyField& field_;
-  SeenPart seen_;
+  SeenOfField seen_;
   double patch_noise_;
   PatternWarp warp_;
   std::vector<float> grey_, valid_, residual_, weight_, weighted_, sizes_;
@@ -365,9 +365,9 @@ PatternFit match_in(const PatternLevel& level, int width, int height, const Part
   const PixelWindow window = window_about(start, level, limits.farthest_px + turning + 1);
   if (window.u1 < 0 || window.v1 < 0 || window.u0 >= width || window.v0 >= height) return {};
   const Vector2d origin(window.u0, window.v0);
-  const SeenPart seen{std::max(0.0, -origin.x()), std::max(0.0, -origin.y()),
-                      std::min(window.u1, width - 1) - origin.x(),
-                      std::min(window.v1, height - 1) - origin.y()};
+  const SeenOfField seen{std::max(0.0, -origin.x()), std::max(0.0, -origin.y()),
+                         std::min(window.u1, width - 1) - origin.x(),
+                         std::min(window.v1, height - 1) - origin.y()};
   PatternWarp here = start;
   here.middle_px -= origin;
   const GreyField field = part_at(window);
