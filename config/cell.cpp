@@ -17,7 +17,12 @@ namespace {
 
 constexpr double largest_mm = 1e6;
 constexpr std::array<std::string_view, 1> driver_names{"gige"};
-constexpr std::array<std::string_view, 2> mark_kind_names{"dark_disc", "bright_disc"};
+// In pairs of one kind, dark and bright.
+constexpr std::array<std::string_view, 10> mark_kind_names{
+    "dark_disc",   "bright_disc", "dark_ring",   "bright_ring", "dark_ball",
+    "bright_ball", "dark_slot",   "bright_slot", "dark_cross",  "bright_cross"};
+constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring, MarkKind::ball, MarkKind::slot,
+                                MarkKind::cross};
 constexpr std::array<std::string_view, 1> link_names{"modbus-tcp"};
 constexpr std::array<std::string_view, 4> frame_names{"object_zero", "world_shift", "robot_base_shift",
                                                       "user_frame"};
@@ -78,16 +83,32 @@ struct NamedMark {
   std::vector<std::string> cameras;
 };
 
+// A ring has a circle inside, other marks have none.
+void read_inner_radius(JsonObject& object, Mark& mark) {
+  double radius_mm = 0;
+  const bool given = object.read_optional("inner_radius_mm", radius_mm, NumberRange{0, 1000, true});
+  const bool ring = mark.kind == MarkKind::ring;
+  if (ring && !(radius_mm > 0 && radius_mm < mark.radius_mm))
+    object.add_mistake("inner_radius_mm", given ? "a radius not below radius_mm" : "a ring without it",
+                       "the radius of the ring's inner circle, mm, below radius_mm");
+  if (!ring && given) object.add_mistake("inner_radius_mm", "a mark that is no ring", "no such key");
+  if (ring) mark.inner_radii_mm = {radius_mm};
+}
+
 NamedMark read_mark(JsonObject& object) {
   NamedMark named;
   Mark& mark = named.mark;
   std::size_t kind = 0;
   object.read("name", mark.name);
   object.read("cameras", named.cameras);
-  if (object.read_word("kind", mark_kind_names, kind)) mark.bright = kind == 1;
+  if (object.read_word("kind", mark_kind_names, kind)) {
+    mark.kind = mark_kinds[kind / 2];
+    mark.bright = kind % 2 == 1;
+  }
   object.read("position_mm", mark.p_O_mm, largest_mm);
   read_normal(object, mark.normal_O);
   object.read_optional("radius_mm", mark.radius_mm, NumberRange{0, 1000, true});
+  read_inner_radius(object, mark);
   object.read_optional("weight", mark.weight, NumberRange{0, 1});
   object.read_optional("tolerance_px", mark.tolerance_px, NumberRange{0, 1000, true});
   object.read_optional("tolerance_mm", mark.tolerance_mm, NumberRange{0, 1000, true});

@@ -52,8 +52,9 @@ MarkSearch search_of(const Options& options, const ImageView& image, const Patte
     search.expected_px = corner + search.half_window_px;
   }
   search.min_diameter_px = options.min_diameter;
+  const double widest = options.window.empty() ? whole.minCoeff() / 2 : 2 * search.half_window_px.norm();
   search.max_diameter_px =
-      options.max_diameter > 0 ? options.max_diameter : std::max(options.min_diameter, whole.minCoeff() / 2);
+      options.max_diameter > 0 ? options.max_diameter : std::max(options.min_diameter, widest);
   search.inner_shares = options.inner;
   search.direction_rad = rad(options.direction);
   search.direction_tolerance_rad = rad(options.direction_tolerance);
@@ -160,7 +161,8 @@ void add_options(CLI::App& verb, Options& options) {
       ->delimiter(',')
       ->expected(4);
   verb.add_option("--min-diameter", options.min_diameter, "px (8)")->check(CLI::Range(3.0, 1e5));
-  verb.add_option("--max-diameter", options.max_diameter, "px (half of the picture)")
+  verb.add_option("--max-diameter", options.max_diameter,
+                  "px (half of the picture, or the window's diagonal)")
       ->check(CLI::Range(3.0, 1e5));
   verb.add_option("--min-axis-ratio", options.search.min_axis_ratio, "shorter by longer axis (0.3)")
       ->check(CLI::Range(0.01, 1.0));

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t most_candidates = 8;  // fits per window and look
 constexpr std::size_t most_of_all = 4000;   // where all are wanted
-constexpr double widest_covered = 12;       // a window in units of the mark: where outlines are put together
+constexpr double widest_covered = 24;       // a window in units of the mark: where outlines are put together
 constexpr double rival_contrast = 0.4;      // of the best one's: then it is a rival
 
 // How near to a found mark a failed one came.

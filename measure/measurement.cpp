@@ -15,7 +15,7 @@ namespace {
 constexpr double diameter_tolerance = 0.3;
 // A disc is seen this much flatter than its normal says at most.
 constexpr double axis_ratio_tolerance = 0.6;
-constexpr double usual_min_axis_ratio = 0.3;
+constexpr double usual_min_axis_ratio = 0.3, thinnest_axis_ratio = 0.05;
 // Limits for marks of unknown radius.
 constexpr double smallest_diameter_px = 4;
 
@@ -37,9 +37,11 @@ MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double s
   search.min_diameter_px = known ? (1 - diameter_tolerance) * diameter_px : smallest_diameter_px;
   search.max_diameter_px =
       known ? (1 + diameter_tolerance) * diameter_px : 2 * search.half_window_px.minCoeff();
+  if (mark.kind == MarkKind::slot || mark.kind == MarkKind::cross)
+    search.min_axis_ratio = thinnest_axis_ratio;
   if (mark.normal_O.isZero()) return search;
   const double facing = std::abs((X_CO.linear() * mark.normal_O).normalized().dot(p_CQ.normalized()));
-  search.min_axis_ratio = std::min(usual_min_axis_ratio, axis_ratio_tolerance * facing);
+  search.min_axis_ratio = std::min(search.min_axis_ratio, axis_ratio_tolerance * facing);
   return search;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "sim/clutter.h"
 #include "sim/random.h"
@@ -118,6 +119,8 @@ std::vector<Thing> cover_things(double radius_mm, double grey, Random& random) {
 }
 
 MarkPlate make_plate(const Mark& mark, const Stage& stage, Random& random) {
+  if (mark.kind != MarkKind::disc)
+    throw std::invalid_argument("mark " + mark.name + ": the simulated cell draws discs only");
   const bool dark = !mark.bright;
   const double surface =
       random.uniform(0.93, 1.07) * (dark ? stage.picture.surface_grey : stage.picture.mark_grey);

@@ -131,7 +131,14 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"/jobs/0/marks/3/weight", "-0.1",
                 "jobs[0].marks[3].weight: found -0.1, expected a number from 0 to 1"},
         Mistake{"/jobs/0/marks/3/kind", "\"cross\"",
-                "jobs[0].marks[3].kind: found \"cross\", expected one of dark_disc, bright_disc"},
+                "jobs[0].marks[3].kind: found \"cross\", expected one of dark_disc, bright_disc, dark_ring, "
+                "bright_ring, dark_ball, bright_ball, dark_slot, bright_slot, dark_cross, bright_cross"},
+        Mistake{"/jobs/0/marks/3/kind", "\"bright_ring\"",
+                "jobs[0].marks[3].inner_radius_mm: found a ring without it, expected the radius of the "
+                "ring's inner "
+                "circle, mm, below radius_mm"},
+        Mistake{"/jobs/0/marks/3/inner_radius_mm", "4",
+                "jobs[0].marks[3].inner_radius_mm: found a mark that is no ring, expected no such key"},
         Mistake{"/jobs/0/marks/3/position_mm", "[1, 2]",
                 "jobs[0].marks[3].position_mm: found an array of 2, expected an array of 3 numbers"},
         Mistake{"/jobs/0/marks/3/position_mm", "[1, \"2\", 3]",

@@ -40,6 +40,8 @@ Json full_example() {
   json["cameras"][0]["gain"] = 1.5;
   json["jobs"][0]["marks"][0]["tolerance_mm"] = 2;
   json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
+  json["jobs"][0]["marks"][0]["kind"] = "dark_ring";
+  json["jobs"][0]["marks"][0]["inner_radius_mm"] = 1;
   json["robots"][0]["require_command_crc"] = false;
   json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
   json["robots"][0]["allowed_readers"] = {"10.0.0.2"};

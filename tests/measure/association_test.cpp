@@ -22,8 +22,8 @@ struct Choice {
 Choice found_marks(Random& random) {
   Choice choice{test::car_body_points(), {}, {}, {}};
   choice.scene.job.system_sigma_px = 0.05;
-  const auto observations =
-      test::observe(choice.scene.cameras, choice.scene.job, test::random_shift(random, 20, 0.2), 0.02, random);
+  const auto observations = test::observe(choice.scene.cameras, choice.scene.job,
+                                          test::random_shift(random, 20, 0.2), 0.02, random);
   EXPECT_EQ(observations.size(), choice.scene.job.views.size());
   for (const Observation& observation : observations) {
     MarkFinding& finding = choice.truth.emplace_back();
