@@ -23,7 +23,7 @@ struct Group {
   std::vector<Chunk> chunks;
   bool known = false;
   std::vector<ImagedPoint> pairs;  // px
-  BestPlane plane;               // X_GP
+  BestPlane plane;                 // X_GP
 };
 
 std::vector<Vector3d> points_of(const Group& group) {

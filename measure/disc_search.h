@@ -32,8 +32,8 @@ enum class HowMany {
 };
 
 // First as regions at grey levels; where that finds none, without the light's falling off, and then, in a
-// window of at most twenty-four times the mark, by their outline, of which parts may be covered. Precondition: the
-// search makes sense and its window is not empty.
+// window of at most twenty-four times the mark, by their outline, of which parts may be covered.
+// Precondition: the search makes sense and its window is not empty.
 MarkSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
                          HowMany wanted, MarkWorkspace& workspace);
 

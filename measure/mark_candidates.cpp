@@ -30,7 +30,12 @@ GreyRange range_of(const SearchImage& image, const MarkSearch& search) {
   std::array<int, 256> histogram{};
   const double diameter = search.min_diameter_px / image.reduction();
   const double mark = 0.25 * std::numbers::pi * diameter * diameter * search.min_axis_ratio;
-  const int stride = mark > 400 ? 3 : mark > 20 ? 2 : 1;
+  // At most some thousand pixels, which still hit every mark.
+  const double enough = std::sqrt(double(image.width()) * image.height() / 6000);
+  const int stride = std::max(mark > 400  ? 3
+                              : mark > 20 ? 2
+                                          : 1,
+                              static_cast<int>(std::min(enough, 0.4 * diameter)));
   for (int v = 0; v < image.height(); v += stride) {
     const std::uint8_t* row = image.row(v);
     for (int u = 0; u < image.width(); u += stride) ++histogram[row[u]];
