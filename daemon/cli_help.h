@@ -81,7 +81,8 @@ Example: all there is for one view
 Exit status: 0 done, 1 no board found (with the reason), 2 wrong usage or unreadable input.)";
 
 inline constexpr const char* find_help =
-    R"(All marks of the kind in the window (without --window in the whole picture), the highest contrast first. Pixel
+    R"(All marks of the kind in the window (without --window in the whole picture), the highest contrast first; slots, crosses,
+corners, edges and templates only where there is one. Pixel
 (0, 0) is the centre of the top-left pixel; suu svv suv is the covariance of the place in px^2. Kinds:
   circle    flat disc or hole, --bright or --dark (default): centre of its ellipse
   ring      circles about one centre: --inner 0.6 or --inner 0.7,0.35 are the inner ones' radii by the outer one's
@@ -90,7 +91,8 @@ inline constexpr const char* find_help =
   cross     two bars; --direction: one of them, --opening: the angle between them
   corner    two edges; --direction: the middle of the angle, into the mark, --opening: the angle
   edge      a straight edge; --direction: across it, from dark to bright; needs a --window
-  template  what --template T.png shows, with --click U,V the point in it (default its middle); needs a --window
+  template  what --template T.png shows, with --click U,V the point in it (default its middle), turned by at most
+            5 degrees or the --direction-tolerance given; needs a --window
 Angles in degrees, from right to down. Sizes are those of the longer axis; a cross's span, an edge's and a corner's
 visible length. Where nothing is found the reason says which limit was missed by which number.
 Examples:

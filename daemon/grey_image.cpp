@@ -30,7 +30,7 @@ cv::Mat load_picture(const std::filesystem::path& path) {
   try {
     picture =
         cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<char*>(bytes.data())),
-                     cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE);
+                     cv::IMREAD_ANYDEPTH | cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception&) {  // an empty file; the message below says it
   }
   if (picture.empty() || (picture.depth() != CV_8U && picture.depth() != CV_16U))

@@ -10,13 +10,13 @@
 namespace zeropose {
 namespace {
 
-constexpr std::size_t most_choices = 512;
+constexpr std::size_t most_choices = 64;
 constexpr double most_sigmas = 4;
 constexpr double least_advantage = 13.8;  // of the sum of squares: likelihood ratio of a thousand
 
 // How well one pose explains the findings: whitened sum of squares, infinite where it does not.
 double misfit_of(const Job& job, std::span<const CalibratedCamera> cameras,
-                 std::span<const MarkFinding> findings, const Pose& X_WO_start) {
+                 std::span<const MarkFinding> findings, const Pose& X_WO_start, int least_redundancy) {
   constexpr double none = std::numeric_limits<double>::infinity();
   const std::vector<Observation> observations = observations_of(findings, job);
   PoseProblem problem;
@@ -27,17 +27,18 @@ double misfit_of(const Job& job, std::span<const CalibratedCamera> cameras,
   problem.system_sigma_px = job.system_sigma_px;
   problem.reject_wrong_marks = false;
   const PoseResult pose = estimate_pose(problem);
-  if (pose.code != Code::ok || pose.redundancy < 2) return none;
+  if (pose.code != Code::ok || pose.redundancy < least_redundancy) return none;
   double sum = 0;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     const Mark& mark = job.marks[observations[i].mark];
     const Deviation& deviation = pose.deviations[i];
+    if (!deviation.used) continue;
     const double px_per_mm = deviation.dev_px.norm() / std::max(1e-12, deviation.dev_mm.norm());
     const double sigma_px = std::hypot(job.system_sigma_px, mark.sigma_mm * px_per_mm);
     const Eigen::Matrix2d S =
         observations[i].covariance_px2 + sigma_px * sigma_px * Eigen::Matrix2d::Identity();
     const double square = deviation.dev_px.dot(S.inverse() * deviation.dev_px);
-    if (square > most_sigmas * most_sigmas) return none;
+    if (!(square <= most_sigmas * most_sigmas && deviation.normalised <= most_sigmas)) return none;
     sum += square;
   }
   return sum;
@@ -58,6 +59,8 @@ std::vector<MarkFinding> decided_by_geometry(const Job& job, std::span<const Cal
     if (choices > most_choices) return findings;
   }
   if (open.empty()) return findings;
+  // Each choice costs what its two pixels tell.
+  const int least_redundancy = 2 + 2 * static_cast<int>(open.size());
   std::vector<MarkFinding> best = findings;
   double least = std::numeric_limits<double>::infinity(), second = least;
   for (std::size_t choice = 0; choice < choices; ++choice) {
@@ -67,7 +70,7 @@ std::vector<MarkFinding> decided_by_geometry(const Job& job, std::span<const Cal
       chosen[i] = candidates[i][rest % candidates[i].size()];
       rest /= candidates[i].size();
     }
-    const double misfit = misfit_of(job, cameras, chosen, X_WO_start);
+    const double misfit = misfit_of(job, cameras, chosen, X_WO_start, least_redundancy);
     if (misfit < least) {
       second = least;
       least = misfit;

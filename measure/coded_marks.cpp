@@ -38,7 +38,8 @@ cv::Mat bytes_of(const ImageView& image) {
   cv::Mat grey(image.height_px, image.width_px, CV_8UC1);
   for (int v = 0; v < image.height_px; ++v) {
     for (int u = 0; u < image.width_px; ++u) {
-      grey.at<std::uint8_t>(v, u) = static_cast<std::uint8_t>(std::lround(image.grey_at(u, v)));
+      grey.at<std::uint8_t>(v, u) =
+          static_cast<std::uint8_t>(std::min(255L, std::lround(image.grey_at(u, v))));
     }
   }
   return grey;
@@ -54,10 +55,10 @@ double grey_between(const ImageView& image, const Eigen::Vector2d& at) {
          y * ((1 - x) * image.grey_at(u, v + 1) + x * image.grey_at(u + 1, v + 1));
 }
 
-// How far outside of a place the black ends: the mean of the rises of grey along the normal, within reach. 0
-// where there is no clear edge.
-double edge_offset(const ImageView& image, const Eigen::Vector2d& at, const Eigen::Vector2d& outwards,
-                   double reach) {
+// How far outside of a place the black ends: the mean of the rises of grey along the normal, within reach.
+// Nothing where there is no clear edge.
+std::optional<double> edge_offset(const ImageView& image, const Eigen::Vector2d& at,
+                                  const Eigen::Vector2d& outwards, double reach) {
   constexpr int steps = 16;
   double weights = 0, sum = 0, before = grey_between(image, at - reach * outwards);
   for (int k = 1; k <= steps; ++k) {
@@ -67,7 +68,8 @@ double edge_offset(const ImageView& image, const Eigen::Vector2d& at, const Eige
     sum += rise * reach * (2 * (k - 0.5) / steps - 1);
     before = here;
   }
-  return weights > least_rise ? std::clamp(sum / weights, -reach, reach) : 0;
+  if (!(weights > least_rise)) return std::nullopt;
+  return std::clamp(sum / weights, -reach, reach);
 }
 
 // A side of the square by the places where the black ends: a point of it and its direction.
@@ -78,12 +80,14 @@ struct CodedMarkSide {
 CodedMarkSide side_of(const ImageView& image, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
   const Eigen::Vector2d along = (to - from).normalized(), outwards(along.y(), -along.x());
   const double length = (to - from).norm(), reach = std::min(3.0, 0.06 * length);
-  double n = 0, x1 = 0, y1 = 0, xx = 0, xy = 0;
+  double all = 0, n = 0, x1 = 0, y1 = 0, xx = 0, xy = 0;
   for (double share = 0.12; share < 0.885; share += 1 / std::max(16.0, length)) {
     const double x = (share - 0.5) * length;
-    const double y = edge_offset(image, from + share * (to - from), outwards, reach);
-    n += 1, x1 += x, y1 += y, xx += x * x, xy += x * y;
+    all += 1;
+    const auto y = edge_offset(image, from + share * (to - from), outwards, reach);
+    if (y) n += 1, x1 += x, y1 += *y, xx += x * x, xy += x * *y;
   }
+  if (n < 0.5 * all) return {0.5 * (from + to), along};  // as OpenCV saw it
   const double slope = (xy - x1 * y1 / n) / (xx - x1 * x1 / n);
   const Eigen::Vector2d middle = 0.5 * (from + to) + (y1 - slope * x1) / n * outwards;
   return {middle, along + slope * outwards};

@@ -123,7 +123,8 @@ bool ContourDescent::descend(double step_sigmas, bool even_light) {
     const Unknowns step = step_from(normal_, lambda), next = at_ + step;
     if (plausible(shape_, next)) {
       const double variance = variance_of(normal_, shape_.size(), window_.rounding_variance);
-      if (std::sqrt(std::max(0.0, step.dot(normal_.N * step)) / variance) < step_sigmas) {
+      if (std::sqrt(std::max(0.0, step.dot(normal_.N * step)) / variance) < step_sigmas &&
+          lambda <= 1) {  // beyond it a step is small only by damping, which is no end
         at_ = next;
         return true;
       }

@@ -90,7 +90,7 @@ SlotShape::SlotShape(const ShapeParameters& about) {
 
 bool SlotShape::plausible(const ShapeParameters& at) const {
   const double determinant = at(2) * at(5) - at(3) * at(4);
-  if (!(determinant > 1e-6) || !(at(6) >= 0) || at(6) > 100) return false;
+  if (!(determinant > 1e-6) || !(at(6) > 0) || at(6) > 100) return false;
   const SlotAxes axes = axes_of(at);
   const double a = axes.along_px.norm(), b = axes.across_px.norm();
   return a > 0.7 && b > 0.7 && a < 5 * b && b < 5 * a && determinant * a * b < 2;

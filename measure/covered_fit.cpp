@@ -159,10 +159,8 @@ EllipseStart start_from(const EllipseFit& fit, OutlineSectors hidden, double ban
   return {fit.centre_px, fit.shape_px2, fit.mark_grey, fit.background_grey, hidden, band_px};
 }
 
-}  // namespace
-
-CoveredFit fit_covered_ellipse(const ImageView& image, const EllipseStart& start, double model_share,
-                               EllipseWorkspace& workspace) {
+CoveredFit settle(const ImageView& image, const EllipseStart& start, double model_share,
+                  EllipseWorkspace& workspace) {
   CoveredFit result;
   result.hidden = grown(start.hidden);
   Shape shape;
@@ -193,6 +191,22 @@ CoveredFit fit_covered_ellipse(const ImageView& image, const EllipseStart& start
     from = start_from(shape.fit, result.hidden, start.band_px);
   }
   return {};
+}
+
+}  // namespace
+
+CoveredFit fit_covered_ellipse(const ImageView& image, const EllipseStart& start, double model_share,
+                               EllipseWorkspace& workspace) {
+  CoveredFit result = settle(image, start, model_share, workspace);
+  if (result.fit.converged || start.hidden != 0) return result;
+  // Nothing is known of what is covered: a third of the outline in one place or another.
+  constexpr OutlineSectors third = (OutlineSectors{1} << 21) - 1;
+  for (int turn = 0; turn < sectors && !result.fit.converged; turn += 8) {
+    EllipseStart without = start;
+    without.hidden = std::rotl(third, turn);
+    result = settle(image, without, model_share, workspace);
+  }
+  return result;
 }
 
 }  // namespace zeropose

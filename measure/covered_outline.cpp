@@ -23,7 +23,7 @@ using Eigen::Vector2d;
 constexpr double least_seen_share = 0.6;
 constexpr double least_steepness_share = 0.2;  // of the least contrast, grey levels per pixel
 constexpr int most_first_points = 160, trials_per_point = 16;
-constexpr std::size_t most_outlines = 6;
+constexpr std::size_t most_outlines = 6, most_partners = 6000;
 constexpr double most_off = 0.75;  // of a point from its outline, pixels of the search image
 
 // Twenty pixels across are enough to tell an arc from a straight line.
@@ -238,12 +238,14 @@ void Outlines::keep(const Ellipse& ellipse) {
 std::vector<Ellipse> Outlines::find() {
   std::minstd_rand random(1);
   const std::size_t stride = std::max<std::size_t>(1, points_.size() / most_first_points);
+  const std::size_t partner_stride = 1 + points_.size() / most_partners;
   const double nearest = std::max(3.0, 0.15 * limits_.smallest);
   std::vector<const Point*> partners;
   for (std::size_t first = 0; first < points_.size(); first += stride) {
     partners.clear();
-    for (const Point& point : points_)
-      if (face_each_other(points_[first], point, nearest, limits_.largest)) partners.push_back(&point);
+    for (std::size_t other = first % partner_stride; other < points_.size(); other += partner_stride)
+      if (face_each_other(points_[first], points_[other], nearest, limits_.largest))
+        partners.push_back(&points_[other]);
     if (partners.size() < 8) continue;
     for (int trial = 0; trial < trials_per_point; ++trial) {
       const Point* a = partners[random() % partners.size()];

@@ -13,14 +13,15 @@
 namespace zeropose {
 namespace {
 
-constexpr std::size_t most_candidates = 8;  // fits per window and look
-constexpr std::size_t most_of_all = 4000;   // where all are wanted
-constexpr double widest_covered = 24;       // a window in units of the mark: where outlines are put together
-constexpr double rival_contrast = 0.4;      // of the best one's: then it is a rival
+constexpr std::size_t most_candidates = 64;  // fits per window and look, where one is wanted
+constexpr double widest_covered = 24;        // a window in units of the mark: where outlines are put together
+constexpr double rival_contrast = 0.4;       // of the best one's: then it is a rival
 
 // How near to a found mark a failed one came.
-int telling(MarkStatus status) {
-  switch (status) {
+int telling(const MarkFinding& finding) {
+  switch (finding.status) {
+    case MarkStatus::no_candidate:  // with a size: an ellipse, but too large or too flat
+      return finding.diameter_px > 0 ? 2 : 0;
     case MarkStatus::too_small:
       return 1;
     case MarkStatus::not_converged:
@@ -46,28 +47,24 @@ bool same_place(const MarkFinding& a, const MarkFinding& b) {
   return (a.u_px - b.u_px).norm() < room && std::abs(a.diameter_px - b.diameter_px) < 2 * room;
 }
 
-void take(const MarkFinding& finding, MarkSight& sight) {
-  if (!stands(finding)) {
-    if (telling(finding.status) >= telling(sight.nearest.status)) sight.nearest = finding;
-    return;
-  }
-  for (MarkFinding& known : sight.standing) {
-    if (!same_place(known, finding)) continue;
-    if (known.status == MarkStatus::saturated) known = finding;
-    return;
-  }
-  const auto behind =
-      std::find_if(sight.standing.begin(), sight.standing.end(),
-                   [&](const MarkFinding& known) { return known.contrast < finding.contrast; });
-  sight.standing.insert(behind, finding);
-}
-
 MarkSight sight_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
-                   std::size_t most, MarkWorkspace& workspace) {
+                   HowMany wanted, MarkWorkspace& workspace) {
+  const std::size_t most = wanted.one() ? most_candidates : wanted.most;
   MarkSight sight;
   sight.nearest.status = seen.reason;
-  for (std::size_t k = 0; k < std::min(most, seen.candidates.size()); ++k)
-    take(fit_mark(image, search, seen.candidates[k].start, workspace.ellipse, workspace.tolerance), sight);
+  for (std::size_t k = 0; k < seen.candidates.size(); ++k) {
+    const MarkCandidate& candidate = seen.candidates[k];
+    // The contrasts descend: what follows is no rival any more.
+    if (wanted.one() && !sight.standing.empty() &&
+        candidate.contrast < rival_contrast * sight.standing.front().contrast)
+      break;
+    if (k >= most) {
+      sight.crowded = true;
+      break;
+    }
+    sight.take(fit_mark(image, search, candidate.start, workspace.ellipse, workspace.tolerance));
+  }
+  sight.crowded = sight.crowded || seen.crowded;
   return sight;
 }
 
@@ -83,7 +80,7 @@ MarkSight look_for_one(const ImageView& image, const MarkSearch& search, std::op
                        MarkWorkspace& workspace) {
   MarkSight sight;
   while (seen) {
-    sight = sight_of(image, search, *seen, most_candidates, workspace);
+    sight = sight_of(image, search, *seen, {}, workspace);
     if (decided(sight, *seen)) break;
     seen = workspace.candidates.finer(image, search);
   }
@@ -92,19 +89,19 @@ MarkSight look_for_one(const ImageView& image, const MarkSearch& search, std::op
 
 // At grey levels so fine that the least contrast does not slip through.
 MarkSight look_for_all(const ImageView& image, const MarkSearch& search, CandidateSearch seen,
-                       MarkWorkspace& workspace) {
+                       std::size_t most, MarkWorkspace& workspace) {
   while (!(seen.step_grey < 0.75 * search.min_contrast)) {
     auto finer = workspace.candidates.finer(image, search);
     if (!finer) break;
     seen = std::move(*finer);
   }
-  return sight_of(image, search, seen, most_of_all, workspace);
+  return sight_of(image, search, seen, {most}, workspace);
 }
 
 MarkSight look_at_regions(const ImageView& image, const MarkSearch& search, CandidateSearch seen,
                           HowMany wanted, MarkWorkspace& workspace) {
-  return wanted == HowMany::all ? look_for_all(image, search, std::move(seen), workspace)
-                                : look_for_one(image, search, std::move(seen), workspace);
+  return wanted.one() ? look_for_one(image, search, std::move(seen), workspace)
+                      : look_for_all(image, search, std::move(seen), wanted.most, workspace);
 }
 
 double grey_near(const ImageView& image, const Eigen::Vector2d& at) {
@@ -148,11 +145,29 @@ void look_at_outlines(const ImageView& image, const PixelWindow& window, const M
     if (!(contrast > 0.5 * search.min_contrast) || !filled(image, search, start)) continue;
     const MarkFinding finding =
         fit_covered_mark(image, search, start, workspace.ellipse, workspace.tolerance);
-    if (finding.status != MarkStatus::not_converged) take(finding, sight);
+    // What is none after all says less than the regions do.
+    if (stands(finding) || finding.status == MarkStatus::blurred) sight.take(finding);
   }
 }
 
 }  // namespace
+
+void MarkSight::take(const MarkFinding& finding) {
+  if (!stands(finding)) {
+    if (telling(finding) >= telling(nearest)) nearest = finding;
+    return;
+  }
+  const auto known = std::find_if(standing.begin(), standing.end(),
+                                  [&](const MarkFinding& other) { return same_place(other, finding); });
+  if (known != standing.end()) {
+    if (known->status != MarkStatus::saturated) return;
+    standing.erase(known);
+  }
+  const auto behind = std::find_if(standing.begin(), standing.end(), [&](const MarkFinding& other) {
+    return other.contrast < finding.contrast;
+  });
+  standing.insert(behind, finding);
+}
 
 bool MarkSight::found() const {
   return std::any_of(standing.begin(), standing.end(),
@@ -163,7 +178,7 @@ MarkFinding MarkSight::only() const {
   if (standing.empty()) return nearest;
   MarkFinding best = standing.front();
   const bool rival = standing.size() > 1 && standing[1].contrast > rival_contrast * best.contrast;
-  if (rival) best.status = MarkStatus::ambiguous;
+  if (rival || crowded) best.status = MarkStatus::ambiguous;
   return best;
 }
 
@@ -176,7 +191,8 @@ MarkSight look_for_discs(const ImageView& image, const PixelWindow& window, cons
   if (sight.found()) return sight;
   if (auto seen = finder.flattened(image, search)) {
     MarkSight flat = look_at_regions(image, search, *std::move(seen), wanted, workspace);
-    if (telling(flat.nearest.status) < telling(sight.nearest.status)) flat.nearest = sight.nearest;
+    flat.take(sight.nearest);
+    for (const MarkFinding& finding : sight.standing) flat.take(finding);
     sight = std::move(flat);
     if (sight.found()) return sight;
   }

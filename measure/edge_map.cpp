@@ -56,7 +56,8 @@ EdgeMap edge_map(const SearchImage& image, float least_steepness) {
     for (int u = 2; u + 2 < map.width; ++u) {
       const auto i = std::size_t(v * map.width + u);
       const float gx = slopes.x[i], gy = slopes.y[i];
-      if (gx * gx + gy * gy < least_steepness * least_steepness) continue;
+      const float square = gx * gx + gy * gy;
+      if (!(square > 0) || square < least_steepness * least_steepness) continue;
       const float here = slopes.size(u, v);
       const float before = size_beside(slopes, u, v, -gx, -gy), after = size_beside(slopes, u, v, gx, gy);
       if (!(here >= before && here > after)) continue;

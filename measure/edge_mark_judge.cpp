@@ -13,15 +13,16 @@ constexpr double rough_px = 0.15;       // what a real outline may deviate, rms
 constexpr double noise_sigmas = 4;      // how far two variances of the same noise may differ
 constexpr double rival_strength = 0.5;  // of the best one's: then it is a rival
 constexpr double same_px = 1, same_rad = 0.1;
+constexpr double most_sigma_px = 0.3;  // of a place that counts
 
 bool makes_sense(const ImageView& image, const MarkSearch& s, bool limits_sizes) {
   const bool sizes = !limits_sizes || (s.min_diameter_px > 0 && s.min_diameter_px <= s.max_diameter_px &&
                                        s.min_axis_ratio > 0 && s.min_axis_ratio <= 1);
   return image.data != nullptr && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
          (s.half_window_px.array() >= 0).all() && std::isfinite(s.min_diameter_px) &&
-         std::isfinite(s.max_diameter_px) && sizes && s.min_contrast > 0 && s.max_blur_px > 0 &&
-         std::isfinite(s.direction_rad) && s.direction_tolerance_rad >= 0 && std::isfinite(s.opening_rad) &&
-         s.opening_tolerance_rad >= 0;
+         std::isfinite(s.max_diameter_px) && sizes && std::isfinite(s.min_contrast) && s.min_contrast > 0 &&
+         std::isfinite(s.max_blur_px) && s.max_blur_px > 0 && std::isfinite(s.direction_rad) &&
+         s.direction_tolerance_rad >= 0 && std::isfinite(s.opening_rad) && s.opening_tolerance_rad >= 0;
 }
 
 // Residuals across the outline: noise as beside it, and a small share of the contrast.
@@ -59,6 +60,14 @@ bool passed(const JudgedMark& mark) {
   return mark.finding.status == MarkStatus::found || mark.finding.status == MarkStatus::saturated;
 }
 
+// What holds a mark in some direction by its last pixels only is not held.
+bool sure_place(const MarkFinding& finding, MarkKind kind) {
+  const Eigen::Matrix2d& S = finding.covariance_px2;
+  const double mean = S.trace() / 2, spread = std::hypot((S(0, 0) - S(1, 1)) / 2, S(0, 1));
+  const double variance = kind == MarkKind::edge ? mean - spread : mean + spread;
+  return variance < most_sigma_px * most_sigma_px;
+}
+
 bool same_mark(const MarkFinding& a, const MarkFinding& b) {
   return (a.u_px - b.u_px).norm() < same_px &&
          std::abs(wrapped_rad(a.direction_rad - b.direction_rad)) < same_rad;
@@ -92,9 +101,11 @@ MarkFinding judged_fit(const ContourFit& fit, const MarkSearch& search) {
   const double noise = fit.flat_rms > 0 ? fit.flat_rms : 0.02 * finding.contrast;
   const double excess = std::max(0.0, fit.edge_rms * fit.edge_rms - noise * noise);
   finding.quality = fit.converged ? 1 / (1 + excess / std::pow(model_share * finding.contrast, 2)) : 0;
-  if (fit.saturated_share > saturated_share) {
+  if (!fit.converged) {
+    finding.status = MarkStatus::not_converged;
+  } else if (fit.saturated_share > saturated_share) {
     finding.status = MarkStatus::saturated;
-  } else if (!fit.converged || !explains(fit, finding.contrast)) {
+  } else if (!explains(fit, finding.contrast)) {
     finding.status = MarkStatus::not_converged;
   } else if (finding.contrast < search.min_contrast) {
     finding.status = MarkStatus::low_contrast;
@@ -106,8 +117,10 @@ MarkFinding judged_fit(const ContourFit& fit, const MarkSearch& search) {
   return finding;
 }
 
-MarkFinding chosen_mark(const std::vector<JudgedMark>& marks, const GreyWindow& window,
-                        const MarkSearch& search) {
+MarkFinding chosen_mark(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search) {
+  for (JudgedMark& mark : marks)
+    if (mark.finding.status == MarkStatus::found && !sure_place(mark.finding, search.kind))
+      mark.finding.status = MarkStatus::not_converged;
   JudgedMark best;
   best.finding.status = MarkStatus::no_candidate;
   if (marks.empty()) {

@@ -31,8 +31,7 @@ struct JudgedMark {
 
 // The strongest that passed; ambiguous, with its numbers, if another one is nearly as strong; else the most
 // telling failure. None: no_candidate, or low_contrast if the window has less than the search's.
-MarkFinding chosen_mark(const std::vector<JudgedMark>& marks, const GreyWindow& window,
-                        const MarkSearch& search);
+MarkFinding chosen_mark(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search);
 
 // Difference of two directions of a line, which has no sense: -pi/2..pi/2.
 double wrapped_line_rad(double angle_rad);

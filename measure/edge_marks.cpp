@@ -12,7 +12,6 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 constexpr double end_px = 3;             // left out where an edge ends in the window
-constexpr double worth_a_fit = 0.3;      // of the strongest line's strength
 constexpr double meeting_px = 7;         // an arm is seen from that near to the corner on
 constexpr double beyond_px = 6;          // and not further behind it
 constexpr std::size_t most_corners = 8;  // fits per window
@@ -73,7 +72,7 @@ JudgedMark fit_edge(const GreyWindow& window, const MarkSearch& search, const Ed
   const double t = along.dot(expected);
   mark.finding.u_px = to_image(window, origin + fit.shape(0) * normal + t * along);
   mark.finding.direction_rad = wrapped_rad(angle);
-  mark.finding.covariance_px2 = covariance_of_edge(fit, -t, normal);
+  mark.finding.covariance_px2 = covariance_of_edge(fit, t, normal);
   if (mark.finding.status == MarkStatus::found && fit.background_grey < fit.mark_grey) {
     mark.finding.status = MarkStatus::not_converged;
   }
@@ -235,16 +234,11 @@ MarkFinding find_edge(const ImageView& image, const MarkSearch& search) {
   LineLimits limits = line_limits_of(search);
   limits.direction_rad = search.direction_rad;
   limits.tolerance_rad = search.direction_tolerance_rad + 0.05;
-  limits.most = 6;
+  limits.most = 8;
   const std::vector<EdgeLine> lines = find_lines(opened.greys, limits);
-  double strongest = 0;
-  for (const EdgeLine& line : lines) strongest = std::max(strongest, line.strength());
   std::vector<JudgedMark> marks;
   ContourWorkspace workspace;
-  for (const EdgeLine& line : lines) {
-    if (line.strength() < worth_a_fit * strongest) continue;
-    marks.push_back(judged_edge(opened.greys, search, line, workspace));
-  }
+  for (const EdgeLine& line : lines) marks.push_back(judged_edge(opened.greys, search, line, workspace));
   return chosen_mark(marks, opened.greys, search);
 }
 

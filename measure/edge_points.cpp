@@ -100,7 +100,7 @@ std::vector<SlopePoint> find_edge_points(const GreyWindow& window, double least_
   for (int j = 3; j < slopes.size.height - 3; ++j) {
     for (int i = 3; i < slopes.size.width - 3; ++i) {
       const float size = slopes.size.at(i, j);
-      if (size < threshold) continue;
+      if (!(size > 0) || size < threshold) continue;
       const float nx = slopes.x.at(i, j) / size, ny = slopes.y.at(i, j) / size;
       const float before = beside(slopes.size, i, j, nx, ny, -1),
                   after = beside(slopes.size, i, j, nx, ny, 1);

@@ -23,7 +23,8 @@ State state_of(const EllipseStart& start, const EllipseBand& band, double blur_p
   return state;
 }
 
-constexpr double near_sigmas = 12;  // a step so small meets the minimum with the normal equations it has
+constexpr double settled_sigmas = 1;  // what is left to go at the end, without damping
+constexpr double near_sigmas = 12;    // a step so small meets the minimum with the normal equations it has
 
 bool is_outer(std::size_t ring) { return ring < EllipseBand::outer_rings; }
 
@@ -122,7 +123,12 @@ struct Descent {
   double lambda = 0;
   int iterations = 0;
 
+  bool settled = false;
+
   Outcome run();
+  double sigmas_of(const Unknowns& step) const {
+    return std::sqrt(std::max(0.0, step.dot(normal.N * step)) / variance_of(normal, band));
+  }
   void start_coarsely();
   bool choose_rings(const State& next);
   void try_state(const State& next, Wanted wanted);
@@ -176,7 +182,7 @@ Outcome Descent::run() {
     State next = state;
     const Unknowns step = step_from(normal, lambda);
     next.at += step;
-    const double sigmas = std::sqrt(std::max(0.0, step.dot(normal.N * step)) / variance_of(normal, band));
+    const double sigmas = sigmas_of(step);
     if (next.plausible() && sigmas < near_sigmas && !rings_chosen) {
       if (!choose_rings(next)) {
         state = next;
@@ -185,6 +191,7 @@ Outcome Descent::run() {
       continue;
     }
     if (next.plausible() && sigmas < 0.1) {
+      settled = lambda == 0 || sigmas_of(step_from(normal, 0)) < settled_sigmas;
       state = next;
       normal.squares -= step.dot(normal.g);
       return Outcome::done;
@@ -226,6 +233,7 @@ EllipseFit report(const Descent& d) {
   const EllipseBand& band = d.band;
   EllipseFit fit;
   fit.iterations = d.iterations;
+  fit.settled = d.settled;
   const SmallCholesky<unknowns> solver(d.normal.N);
   fit.covariance_px2 = variance_of(d.normal, band) * solver.inverse().topLeftCorner<2, 2>();
   fit.centre_px = d.state.at.head<2>() + Eigen::Vector2d(band.origin_u, band.origin_v);

@@ -26,6 +26,7 @@ struct BlurShape {
 
 struct EllipseFit {
   bool converged = false;
+  bool settled = false;  // the last step was small by itself, not by damping alone: else no measurement
   Eigen::Vector2d centre_px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
   Eigen::Matrix2d shape_px2 = Eigen::Matrix2d::Zero();
@@ -37,7 +38,7 @@ struct EllipseFit {
   double edge_count = 0, flat_count = 0;  // pixels behind the two
   double outline_px = 0;                  // how far the outline is from the ellipse: rms over sixteen sectors
   double outline_noise_px = 0;            // what the noise alone makes of that
-  double saturated_share = 0;             // of the band's pixels that stand at 255
+  double saturated_share = 0;             // of the band's pixels that stand at white
   int iterations = 0;
 };
 

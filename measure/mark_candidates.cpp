@@ -9,42 +9,18 @@
 namespace zeropose {
 namespace {
 
-constexpr double coarsest_step = 24, finest_step = 3;  // grey levels
+constexpr double coarsest_step = 18, finest_step = 3;  // grey levels
+constexpr double shift_share = 1.0 / 6;                // of the step: how far a level may give way to noise
 constexpr double size_margin_px = 2;                   // the region at one level against the fitted outline
 
-constexpr double flatten_share = 0.5;  // of the least contrast: what the light may fall off over a mark
+constexpr std::size_t most_groups = 2000;  // things kept apart
+constexpr double flatten_share = 0.5;      // of the least contrast: what the light may fall off over a mark
 
 // As coarse as the smallest mark allows: ten pixels across are enough to know it.
 int reduction_for(const MarkSearch& search) {
   int reduction = 1;
   while (reduction < 8 && search.min_diameter_px >= 20 * reduction) reduction *= 2;
   return reduction;
-}
-
-struct GreyRange {
-  int low = 0, high = 0;
-};
-
-// Between the grey levels that fewer pixels than a small mark has lie below, or above.
-GreyRange range_of(const SearchImage& image, const MarkSearch& search) {
-  std::array<int, 256> histogram{};
-  const double diameter = search.min_diameter_px / image.reduction();
-  const double mark = 0.25 * std::numbers::pi * diameter * diameter * search.min_axis_ratio;
-  // At most some thousand pixels, which still hit every mark.
-  const double enough = std::sqrt(double(image.width()) * image.height() / 6000);
-  const int stride = std::max(mark > 400  ? 3
-                              : mark > 20 ? 2
-                                          : 1,
-                              static_cast<int>(std::min(enough, 0.4 * diameter)));
-  for (int v = 0; v < image.height(); v += stride) {
-    const std::uint8_t* row = image.row(v);
-    for (int u = 0; u < image.width(); u += stride) ++histogram[row[u]];
-  }
-  const int few = std::max(1, static_cast<int>(0.25 * mark / (stride * stride)));
-  GreyRange range{0, 255};
-  for (int sum = 0; range.low < 255 && (sum += histogram[std::size_t(range.low)]) < few;) ++range.low;
-  for (int sum = 0; range.high > 0 && (sum += histogram[std::size_t(range.high)]) < few;) --range.high;
-  return range;
 }
 
 double sample(const ImageView& image, const Eigen::Vector2d& at) {
@@ -118,12 +94,13 @@ std::optional<CandidateSearch> CandidateFinder::flattened(const ImageView& image
 
 CandidateSearch CandidateFinder::start(const ImageView& image, const MarkSearch& search) {
   groups_.clear();
+  crowded_ = false;
   reason_ = MarkStatus::no_candidate;
-  const GreyRange range = range_of(reduced_, search);
-  low_ = range.low;
-  high_ = range.high;
+  histogram_ = GreyHistogram(reduced_, search);
+  low_ = histogram_.low();
+  high_ = histogram_.high();
   step_ = 0;
-  if (high_ - low_ < search.min_contrast) return {{}, MarkStatus::low_contrast, 0};
+  if (high_ - low_ < search.min_contrast) return {{}, MarkStatus::low_contrast, false, 0};
   step_ = (high_ - low_) / std::ceil((high_ - low_) / coarsest_step);
   return look(image, search, low_ + step_ / 2);
 }
@@ -135,11 +112,12 @@ std::optional<CandidateSearch> CandidateFinder::finer(const ImageView& image, co
 }
 
 CandidateSearch CandidateFinder::look(const ImageView& image, const MarkSearch& search, double first_level) {
-  for (double level = first_level; level < high_; level += step_) {
-    look_at_level(search, static_cast<int>(std::lround(level)));
-  }
+  const double room = shift_share * step_;
+  for (double level = first_level; level < high_; level += step_)
+    look_at_level(search, histogram_.quietest_near(level, room));
   CandidateSearch result = judge(image, search);
-  result.step_grey = step_;
+  result.crowded = crowded_;
+  result.step_grey = step_ + 2 * room;
   return result;
 }
 
@@ -182,11 +160,15 @@ void CandidateFinder::add(const Sighting& sighting) {
       return;
     }
   }
-  groups_.push_back({sighting});
+  if (groups_.size() < most_groups) {
+    groups_.push_back({sighting});
+  } else {
+    crowded_ = true;
+  }
 }
 
 CandidateSearch CandidateFinder::judge(const ImageView& image, const MarkSearch& search) {
-  CandidateSearch result{{}, reason_, 0};
+  CandidateSearch result{{}, reason_, false, 0};
   const double sign = search.bright ? -1 : 1;
   for (Group& group : groups_) {
     std::sort(group.begin(), group.end(),

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "measure/ellipse_fit.h"
+#include "measure/grey_histogram.h"
 #include "measure/mark_blobs.h"
 #include "measure/marks.h"
 #include "measure/search_image.h"
@@ -21,7 +22,8 @@ struct MarkCandidate {
 struct CandidateSearch {
   std::vector<MarkCandidate> candidates;         // the highest contrast first
   MarkStatus reason = MarkStatus::no_candidate;  // when there are none: what came nearest to a mark
-  double step_grey = 0;                          // things of less contrast may have been overlooked
+  bool crowded = false;                          // more things than could be kept apart
+  double step_grey = 0;                          // widest: things of less contrast may have been overlooked
 };
 
 // Looks at grey levels step by step through the range of a window.
@@ -53,10 +55,12 @@ class CandidateFinder {
   CandidateSearch judge(const ImageView& image, const MarkSearch& search);
 
   SearchImage reduced_;
+  GreyHistogram histogram_;
   BlobFinder blobs_;
   std::vector<Group> groups_;
   MarkStatus reason_ = MarkStatus::no_candidate;
   double low_ = 0, high_ = 0, step_ = 0;
+  bool crowded_ = false;
 };
 
 }  // namespace zeropose

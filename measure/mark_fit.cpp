@@ -61,7 +61,8 @@ bool in_place(const EllipseFit& fit, const EllipseStart& start, double room_shar
 MarkStatus status_of(const EllipseFit& fit, const MarkFinding& finding, const MarkSearch& search,
                      bool explained) {
   if (fit.saturated_share > saturated_share) return MarkStatus::saturated;
-  if (!explained || (fit.mark_grey > fit.background_grey) != search.bright) return MarkStatus::not_converged;
+  if (!explained || !fit.settled || (fit.mark_grey > fit.background_grey) != search.bright)
+    return MarkStatus::not_converged;
   if (finding.contrast < search.min_contrast) return MarkStatus::low_contrast;
   if (finding.blur_px > search.max_blur_px) return MarkStatus::blurred;
   if (finding.diameter_px < search.min_diameter_px) return MarkStatus::too_small;

@@ -35,7 +35,10 @@ MarkStatus first_look(const ImageView& image, const MarkSearch& search) {
   return window_of(image, search).empty() ? MarkStatus::outside_image : MarkStatus::found;
 }
 
-int pixel_of(double place, int size) { return static_cast<int>(std::clamp(place, -1.0, double(size))); }
+// -1 for what is no number.
+int pixel_of(double place, int size) {
+  return std::isnan(place) ? -1 : static_cast<int>(std::clamp(place, -1.0, double(size)));
+}
 
 MarkFinding with_status(MarkStatus status) {
   MarkFinding finding;
@@ -44,8 +47,8 @@ MarkFinding with_status(MarkStatus status) {
 }
 
 MarkSight sight_of_one(const MarkFinding& finding) {
-  if (finding.status == MarkStatus::found) return {{finding}, {}};
-  return {{}, finding};
+  if (finding.status == MarkStatus::found) return {{finding}, {}, false};
+  return {{}, finding, false};
 }
 
 // Its memory is kept from one frame to the next; a fresh one costs as much as a search.
@@ -63,14 +66,14 @@ MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wan
   // The others look by themselves whether a search makes sense.
   if (is_round(search.kind))
     if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
-      return {{}, with_status(status)};
-  const PixelWindow window = window_of(image, search);
+      return {{}, with_status(status), false};
+  const PixelWindow window = is_round(search.kind) ? window_of(image, search) : PixelWindow{};
   switch (search.kind) {
     case MarkKind::disc:
     case MarkKind::ball:
       return look_for_discs(image, window, search, wanted, workspace);
     case MarkKind::ring:
-      return look_for_rings(image, window, search, wanted, workspace);
+      return look_for_rings(image, window, search, workspace);
     case MarkKind::slot:
       return sight_of_one(find_slot(image, search));
     case MarkKind::cross:
@@ -99,16 +102,21 @@ std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const Mark
   std::vector<MarkFinding> findings;
   findings.reserve(searches.size());
   MarkWorkspace& workspace = kept_workspace();
-  for (const MarkSearch& search : searches)
-    findings.push_back(look_for(image, search, HowMany::one, workspace).only());
+  for (const MarkSearch& search : searches) findings.push_back(look_for(image, search, {}, workspace).only());
   return findings;
 }
 
-AllMarks find_all_marks(const ImageView& image, const MarkSearch& search) {
-  MarkWorkspace& workspace = kept_workspace();
-  MarkSight sight = look_for(image, search, HowMany::all, workspace);
-  std::erase_if(sight.standing, [](const MarkFinding& mark) { return mark.status != MarkStatus::found; });
-  return {std::move(sight.standing), sight.nearest};
+AllMarks find_all_marks(const ImageView& image, const MarkSearch& search, std::size_t most) {
+  MarkSight sight = look_for(image, search, {std::max<std::size_t>(1, most)}, kept_workspace());
+  AllMarks all{{}, sight.nearest, sight.crowded};
+  for (MarkFinding& mark : sight.standing) {
+    if (mark.status == MarkStatus::found) {
+      all.found.push_back(std::move(mark));
+    } else {
+      all.nearest = std::move(mark);
+    }
+  }
+  return all;
 }
 
 }  // namespace zeropose

@@ -94,11 +94,14 @@ std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const Mark
 
 // All things in a window that pass for the mark, the highest contrast first: where several are wanted, or the
 // geometry of several marks is to choose. nearest: what came nearest where there is none.
+// Slots, crosses, corners, edges and patterns: at most the one that find_marks() finds. crowded: there are
+// more than the `most` of highest contrast that were looked at.
 struct AllMarks {
   std::vector<MarkFinding> found;
   MarkFinding nearest;
+  bool crowded = false;
 };
-AllMarks find_all_marks(const ImageView& image, const MarkSearch& search);
+AllMarks find_all_marks(const ImageView& image, const MarkSearch& search, std::size_t most = 4000);
 
 // Why it was not found, with the numbers and the limit they miss, for people.
 std::string reason_text(const MarkFinding& finding, const MarkSearch& search);

@@ -15,9 +15,11 @@ namespace {
 constexpr double diameter_tolerance = 0.3;
 // A disc is seen this much flatter than its normal says at most.
 constexpr double axis_ratio_tolerance = 0.6;
-constexpr double usual_min_axis_ratio = 0.3, thinnest_axis_ratio = 0.05;
+constexpr double thinnest_axis_ratio = 0.05;
 // Limits for marks of unknown radius.
 constexpr double smallest_diameter_px = 4;
+// Things in one window that the geometry is asked about; more are no question of geometry.
+constexpr std::size_t most_alike = 12;
 
 MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double search_mm, const Pose& X_WO) {
   MarkSearch search;
@@ -28,9 +30,9 @@ MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double s
   const Pose X_CO = camera.X_WC.inverse() * X_WO;
   const Eigen::Vector3d p_CQ = X_CO * mark.p_O_mm;
   const auto u_px = project(camera.model, p_CQ);
+  if (u_px) search.expected_px = *u_px;
   if (!u_px || !in_image(camera.model, *u_px)) return search;
   const Eigen::Vector2d px_per_mm(camera.model.fx_px / p_CQ.z(), camera.model.fy_px / p_CQ.z());
-  search.expected_px = *u_px;
   search.half_window_px = (mark.radius_mm + search_mm) * px_per_mm;
   const double diameter_px = 2 * mark.radius_mm * px_per_mm.maxCoeff();
   const bool known = mark.radius_mm > 0;
@@ -39,9 +41,11 @@ MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double s
       known ? (1 + diameter_tolerance) * diameter_px : 2 * search.half_window_px.minCoeff();
   if (mark.kind == MarkKind::slot || mark.kind == MarkKind::cross)
     search.min_axis_ratio = thinnest_axis_ratio;
-  if (mark.normal_O.isZero()) return search;
+  if (mark.normal_O.isZero() || mark.kind == MarkKind::ball) return search;
+  const bool flat = mark.kind == MarkKind::disc || mark.kind == MarkKind::ring;
   const double facing = std::abs((X_CO.linear() * mark.normal_O).normalized().dot(p_CQ.normalized()));
-  search.min_axis_ratio = std::min(search.min_axis_ratio, axis_ratio_tolerance * facing);
+  search.min_axis_ratio =
+      flat ? axis_ratio_tolerance * facing : std::min(search.min_axis_ratio, axis_ratio_tolerance * facing);
   return search;
 }
 
@@ -183,8 +187,9 @@ std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, con
     const auto found = find_marks(image.image, searches);
     for (std::size_t k = 0; k < views.size(); ++k) {
       findings[views[k]] = found[k];
-      if (found[k].status == MarkStatus::ambiguous)
-        candidates[views[k]] = find_all_marks(image.image, searches[k]).found;
+      if (found[k].status != MarkStatus::ambiguous) continue;
+      AllMarks all_alike = find_all_marks(image.image, searches[k], most_alike);
+      if (!all_alike.crowded) candidates[views[k]] = std::move(all_alike.found);
     }
   }
   return decided_by_geometry(job, cameras, std::move(findings), candidates, X_WO_expected);

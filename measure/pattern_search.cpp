@@ -43,7 +43,7 @@ bool usable(const Pattern* pattern) {
 bool makes_sense(const MarkSearch& s) {
   return usable(s.pattern) && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
          (s.half_window_px.array() >= 0).all() && std::isfinite(s.direction_rad) &&
-         s.direction_tolerance_rad >= 0 && s.min_contrast > 0;
+         s.direction_tolerance_rad >= 0 && s.min_contrast > 0 && s.max_blur_px > 0;
 }
 
 double tolerance_of(const MarkSearch& search) {
@@ -180,22 +180,22 @@ void PatternSearcher::describe(const PatternFit& fit, MarkFinding& finding) cons
 }
 
 MarkStatus PatternSearcher::judge(const PatternFit& fit, const MarkFinding& finding) const {
-  if (fit.correlation < alike) return MarkStatus::no_candidate;
+  if (!(fit.correlation >= alike)) return MarkStatus::no_candidate;
   if (fit.saturated_share > saturated_share) return MarkStatus::saturated;
   if (stands_out(fit) && fit.correlation > much_alike) return MarkStatus::cut_off;
   if (!fit.converged) return MarkStatus::not_converged;
-  if (finding.contrast < search_.min_contrast) return MarkStatus::low_contrast;
+  if (!(finding.contrast >= search_.min_contrast)) return MarkStatus::low_contrast;
   const double scale = scale_of(fit.warp), turn = angle_between(finding.direction_rad, search_.direction_rad);
   if (scale < 1 - scale_range) return MarkStatus::too_small;
   if (scale > 1 + scale_range || finding.axis_ratio < least_squeeze ||
       std::abs(turn) > tolerance_of(search_) + turn_slack_rad) {
     return MarkStatus::no_candidate;
   }
-  if (finding.blur_px > search_.max_blur_px) return MarkStatus::blurred;
-  if (fit.correlation < least_correlation) {
+  if (!(finding.blur_px <= search_.max_blur_px)) return MarkStatus::blurred;
+  if (!(fit.correlation >= least_correlation)) {
     return fit.blur_px2 > blurred_px2 ? MarkStatus::blurred : MarkStatus::not_converged;
   }
-  if (fit.used_share < least_share) return MarkStatus::not_converged;
+  if (!(fit.used_share >= least_share)) return MarkStatus::not_converged;
   if (!(finding.covariance_px2.trace() < most_sigma_px * most_sigma_px)) return MarkStatus::low_contrast;
   return MarkStatus::found;
 }
@@ -225,8 +225,9 @@ int telling(const MarkFinding& finding) {
 // A second place counts where it explains its pixels nearly as well.
 bool rivals(const MarkFinding& a, const MarkFinding& b) {
   const double unlike_a = 1 - std::sqrt(a.quality), unlike_b = 1 - std::sqrt(b.quality);
-  const double apart = 0.1 * std::max(a.diameter_px, b.diameter_px);
-  return (a.u_px - b.u_px).norm() > apart &&
+  // Two fits of one place agree far better than this.
+  constexpr double apart_px = 2;
+  return (a.u_px - b.u_px).norm() > apart_px &&
          std::max(unlike_a, unlike_b) < 0.05 + 4 * std::min(unlike_a, unlike_b);
 }
 

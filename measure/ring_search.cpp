@@ -10,6 +10,7 @@
 namespace zeropose {
 namespace {
 
+constexpr std::size_t most_inner_discs = 1000;
 constexpr double size_tolerance = 0.1;  // of the share of an inner circle
 constexpr double centre_tolerance =
     0.04;  // between two circles, of the outer one's diameter: tilt moves them
@@ -26,7 +27,7 @@ MarkSearch innermost(const MarkSearch& ring) {
   return search;
 }
 
-// Half of the narrowest wall beside the k-th circle belongs to its band.
+// A good half of the narrowest wall beside the k-th circle belongs to its band.
 double band_of(const std::vector<double>& shares, std::size_t k, double minor_px) {
   double wall = 1;
   if (k > 0) wall = std::min(wall, shares[k - 1] - shares[k]);
@@ -108,18 +109,18 @@ MarkFinding ring_about(const ImageView& image, const MarkSearch& search, const M
 }  // namespace
 
 MarkSight look_for_rings(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                         HowMany wanted, MarkWorkspace& workspace) {
-  const MarkSight inner = look_for_discs(image, window, innermost(search), wanted, workspace);
+                         MarkWorkspace& workspace) {
+  // All of them: what is the best disc need not be in the best ring.
+  const MarkSight inner = look_for_discs(image, window, innermost(search), {most_inner_discs}, workspace);
   MarkSight rings;
   rings.nearest = inner.nearest;
-  for (const MarkFinding& disc : inner.standing) {
-    const MarkFinding ring = ring_about(image, search, disc, workspace);
-    if (ring.status == MarkStatus::found) {
-      rings.standing.push_back(ring);
+  rings.crowded = inner.crowded;
+  for (const MarkFinding& disc : inner.standing)
+    if (disc.status == MarkStatus::saturated) {
+      rings.take(disc);
     } else {
-      rings.nearest = ring;
+      rings.take(ring_about(image, search, disc, workspace));
     }
-  }
   return rings;
 }
 

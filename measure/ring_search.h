@@ -11,6 +11,6 @@ namespace zeropose {
 // the circle radius_share. The numbers and the shape are those of the outer circle. Precondition: as
 // look_for_discs(), and inner_shares descend within 0..1.
 MarkSight look_for_rings(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
-                         HowMany wanted, MarkWorkspace& workspace);
+                         MarkWorkspace& workspace);
 
 }  // namespace zeropose

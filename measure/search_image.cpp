@@ -96,6 +96,7 @@ void SearchImage::prepare(const ImageView& image, const PixelWindow& window, int
   const double half = 0.5 * (reduction - 1);
   origin_px_ = {window.u0 + half, window.v0 + half};
   greys_.resize(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(std::max(0, height_)));
+  tiles_.clear();
   if (empty()) return;
   if (image.two_bytes()) {
     reduce_words(image, window);

@@ -235,6 +235,7 @@ JudgedMark judged_slot(const GreyWindow& window, const MarkSearch& search, const
   JudgedMark mark{judged_fit(fit, search), slot.contrast * slot.length_px};
   MarkFinding& finding = mark.finding;
   if (!fit.converged) {
+    finding.u_px = to_image(window, slot.centre);
     finding.contrast = slot.contrast;
     finding.diameter_px = slot.length_px;
     return mark;

@@ -136,6 +136,41 @@ TEST_P(Shapes, SoftAndFaintOnesAreFoundAsWell) {
   }
 }
 
+// One end of the edge is covered, and the place is asked for far beyond the other one: its angle counts. The
+// scatter across against the covariance, on either side.
+TEST(ShapeEdge, TheCovarianceIsThatOfThePlaceAskedFor) {
+  for (const double expected_v : {8.0, 51.0}) {
+    PolygonDrawing drawing;
+    drawing.width_px = drawing.height_px = 60;
+    drawing.background = 60;
+    drawing.polygons = {{{{30.3, -20}, {90, -20}, {90, 90}, {30.3, 90}}, 160},
+                        {{{-20, 34}, {90, 34}, {90, 90}, {-20, 90}}, 100}};
+    const test::Picture picture = paint(drawing);
+    MarkSearch search;
+    search.kind = MarkKind::edge;
+    search.expected_px = {30, expected_v};
+    search.half_window_px = {40, 60};
+    search.min_diameter_px = 10;
+    search.max_diameter_px = 100;
+    search.direction_tolerance_rad = 0.3;
+    std::mt19937_64 random(7);
+    constexpr int draws = 300;
+    double squares = 0, variances = 0, found = 0;
+    for (int draw = 0; draw < draws; ++draw) {
+      const test::Pixels pixels = expose(picture, 2, random);
+      const MarkFinding finding = find_edge(pixels.view(), search);
+      if (finding.status != MarkStatus::found) continue;
+      ++found;
+      const Vector2d n = unit(finding.direction_rad);
+      squares += std::pow(n.dot(finding.u_px - Vector2d(30.3, expected_v)), 2);
+      variances += n.dot(finding.covariance_px2 * n);
+    }
+    EXPECT_GT(found, 0.97 * draws);
+    // Three hundred draws know a scatter to 4 %: four sigma.
+    EXPECT_NEAR(std::sqrt(squares / variances), 1, 0.17) << expected_v;
+  }
+}
+
 // A gap: two edges of opposite sense. 300 edges: the mean squares of 1 +- sqrt(2 / 300), against their own
 // covariance and against the bound (which the whole picture has, the band has not).
 TEST(ShapeGap, BothEdgesReachTheBound) {

@@ -160,6 +160,41 @@ TEST(Balls, TheOutlineIsWhereTheClosedFormSays) {
   EXPECT_LT((offset - closed).norm(), 5 * std::sqrt(finding.covariance_px2.trace()));
 }
 
+// Many things of more contrast than the mark, none of them round, must not hide a rival of it.
+TEST(Rivals, BehindManyOtherThingsAreSeen) {
+  Drawing drawing = surface();
+  drawing.width_px = 260;
+  const auto square = [&](double u, double v) {
+    drawing.figures.push_back({});
+    drawing.figures.back().grey = 20;
+    for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}})
+      drawing.figures.back().corners_px.push_back({u + 7.0 * x, v + 7.0 * y});
+  };
+  for (int k = 0; k < 12; ++k) square(20 + 20.0 * k, 20);
+  drawing.figures.push_back(ellipse({70, 80}, 20, 1, 0, 80));
+  MarkSearch search = search_of(MarkKind::disc);
+  search.expected_px = {130, 70};
+  search.half_window_px = {126, 66};
+  search.min_diameter_px = 14;
+  search.max_diameter_px = 26;
+  EXPECT_EQ(find(drawing, search).status, MarkStatus::found);
+  drawing.figures.push_back(ellipse({190, 80}, 20, 1, 0, 90));
+  EXPECT_EQ(find(drawing, search).status, MarkStatus::ambiguous);
+}
+
+TEST(Rings, TwoOfThemAreAmbiguousHoweverTheirDiscsDiffer) {
+  Drawing drawing = surface();
+  drawing.width_px = 260;
+  drawing.background = 120;
+  // Inner discs of contrast 130 and 60, rings of 30 and 60: the second one is the better ring.
+  drawing.figures = {ellipse({70, 70}, 46, 1, 0, 90), ellipse({70, 70}, 27.6, 1, 0, 220),
+                     ellipse({190, 70}, 46, 1, 0, 60), ellipse({190, 70}, 27.6, 1, 0, 120)};
+  MarkSearch search = search_of(MarkKind::ring);
+  search.expected_px = {130, 70};
+  search.half_window_px = {126, 66};
+  EXPECT_EQ(find(drawing, search).status, MarkStatus::ambiguous);
+}
+
 // With a highlight inside.
 TEST(Balls, MayShine) {
   Drawing drawing = surface();
