@@ -3,26 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "measure/normal_bell.h"
+
 namespace zeropose::ellipse_model {
 namespace {
-
-struct Bell {
-  float density, below;  // of the standard normal distribution
-};
-
-// Good to 1e-6 for the density and 1e-5 for the integral (Abramowitz and Stegun 26.2.17); free of branches,
-// so that the compiler turns the loop round it into vector code.
-[[gnu::always_inline]] inline Bell bell(float t) {
-  const float size = std::min(std::abs(t), 5.0F);
-  const float y = size * size * (-0.5F / 32);
-  float e = 1 + y * (1 + y * (1.0F / 2) * (1 + y * (1.0F / 3) * (1 + y * (1.0F / 4) * (1 + y * (1.0F / 5)))));
-  e *= e, e *= e, e *= e, e *= e, e *= e;
-  const float density = 0.398942280F * e, k = 1 / (1 + 0.2316419F * size);
-  const float tail =
-      density * k *
-      (0.319381530F + k * (-0.356563782F + k * (1.781477937F + k * (-1.821255978F + k * 1.330274429F))));
-  return {density, t < 0 ? tail : 1 - tail};
-}
 
 constexpr std::size_t block_size = 16, columns = unknowns + 1;
 
@@ -62,7 +46,7 @@ struct Constants {
     const float along = 2 * im * im;
     const float sharpness =
         k.inverse_blur * (1 + k.blur_c * (along * wx * wx - 1) + k.blur_s * along * wx * wy);
-    const Bell edge = bell(d * sharpness);
+    const NormalBell edge = normal_bell(d * sharpness);
     const float light = 1 + k.light_x * px[i] + k.light_y * py[i];
     const float level = k.low + k.step * edge.below;
     const float slope = light * k.step * edge.density * sharpness;

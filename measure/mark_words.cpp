@@ -36,8 +36,7 @@ std::string reason_text(const MarkFinding& finding, const MarkSearch& search) {
       return {};
     case MarkStatus::not_searched:
       return "the search makes no sense: window, sizes, axis ratio and contrast must be positive numbers, "
-             "the "
-             "limits in order";
+             "the limits in order, the radii of a ring's inner circles descending within 0 to 1";
     case MarkStatus::outside_image:
       return std::string("the window about ") + place(search.expected_px) + " lies outside the image";
     case MarkStatus::no_candidate:

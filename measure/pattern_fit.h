@@ -42,12 +42,6 @@ struct MatchLimits {
   double last_step_sigmas = 0.03;
 };
 
-// The seen part of a field that is larger than the image.
-struct SeenPart {
-  double u0 = 0, v0 = 0, u1 = 0, v1 = 0;                   // px of the field
-  double white = std::numeric_limits<double>::infinity();  // grey level from which pixels are saturated
-};
-
 // Model: image(warp(x)) = gain * patch(x) + offset, 8 unknowns, inverse compositional Gauss-Newton (S. Baker,
 // I. Matthews: Lucas-Kanade 20 years on, IJCV 2004) over the image's cubic spline with weights that fall to 0
 // between 2.5 and 4.5 robust sigmas. The slopes are the patch's, so that the noise of the image cannot pull
