@@ -290,7 +290,7 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
     return outcome;
   }
   on_exposed();
-  m = zeropose::measure(images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero);
+  m = zeropose::measure({images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero});
   outcome.compute = Clock::now() - grabbed;
   return outcome;
 }

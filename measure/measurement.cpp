@@ -204,8 +204,8 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
   return observations;
 }
 
-Measurement measure(std::span<const CameraImage> images, const Job& job,
-                    std::span<const CalibratedCamera> cameras, const Zero& zero) {
+Measurement measure(const MeasurementProblem& problem) {
+  const auto& [images, job, cameras, zero] = problem;
   Measurement measurement;
   if (!passes(measurement, check_zero(job, zero))) return measurement;
   if (!passes(measurement, check_images(images, job, cameras))) return measurement;

@@ -42,10 +42,16 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
 std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, const Job& job,
                                         std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected);
 
+// What one measurement is made from. Everything is borrowed.
+struct MeasurementProblem {
+  std::span<const CameraImage> images;
+  const Job& job;
+  std::span<const CalibratedCamera> cameras;
+  const Zero& zero;  // without compensations (default-made) it is missing
+};
+
 // Marks, pose, security and limits in the order of M6; the first check that fails names the code. Marks are
-// searched around the zero pose and used where the zero measurement's compensation puts them. A zero without
-// compensations (default-made) is missing.
-Measurement measure(std::span<const CameraImage> images, const Job& job,
-                    std::span<const CalibratedCamera> cameras, const Zero& zero);
+// searched around the zero pose and used where the zero measurement's compensation puts them.
+Measurement measure(const MeasurementProblem& problem);
 
 }  // namespace zeropose

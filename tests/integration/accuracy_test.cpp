@@ -147,7 +147,7 @@ TEST(Accuracy, OfRelativePosesWithTheTrueCalibration) {
     car.X_O0O_true = shifts[static_cast<std::size_t>(i)];
     std::uint64_t state = 1000 + static_cast<std::uint64_t>(i);
     const Frame frame(cell.clean(zero_pose() * car.X_O0O_true), state);
-    car.measurement = measure(frame.images(), cell.job(), cell.truth(), zero.zero);
+    car.measurement = measure({frame.images(), cell.job(), cell.truth(), zero.zero});
   });
   const auto errors = statistics_of(cars);
   errors.print("rendered, true calibration");
@@ -182,7 +182,7 @@ struct Series {
     std::vector<Car> cars;
     for (std::size_t i = 0; i < shifts.size(); ++i) {
       const Frame frame(pictures[i], noise_state);
-      cars.push_back({shifts[i], measure(frame.images(), cell.job(), believed, measured.zero)});
+      cars.push_back({shifts[i], measure({frame.images(), cell.job(), believed, measured.zero})});
     }
     return cars;
   }

@@ -161,7 +161,7 @@ TEST(Measurement, StopsAtTheFirstThingThatIsMissing) {
   std::vector<CameraImage> images;
   for (std::size_t camera = 0; camera < 4; ++camera) images.push_back({camera, grey.view});
   const auto code = [&](std::span<const CameraImage> pictures, const Zero& zero) {
-    const Measurement measurement = measure(pictures, scene.job, scene.cameras, zero);
+    const Measurement measurement = measure({pictures, scene.job, scene.cameras, zero});
     EXPECT_FALSE(measurement.reason.empty());
     EXPECT_EQ(measurement.X_O0O.matrix(), Pose::Identity().matrix());
     return measurement.code;
