@@ -121,6 +121,7 @@ void read_requirements(JsonObject& object, Requirements& requirements) {
   object.read_optional("min_marks_per_camera", requirements.min_marks_per_camera, 0, 10000);
   object.read_optional("min_cameras", requirements.min_cameras, 1, 1000);
   object.read("max_sigma_mm", requirements.max_sigma_mm, NumberRange{0, 100, true});
+  object.read_optional("max_hidden_mm", requirements.max_hidden_mm, NumberRange{0, 1000, true});
   object.read_optional("max_compensation_mm", requirements.max_compensation_mm, NumberRange{0, 100});
 }
 

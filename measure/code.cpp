@@ -80,6 +80,13 @@ constexpr std::array table{
              "Marks are missing or badly seen: look at the pictures; or the job has too few marks near that "
              "point."},
 
+    CodeText{
+        Code::hidden_error_too_large, "hidden_error_too_large",
+        "Too few marks check each other: one wrong mark could move the result further than the job allows "
+        "without being noticed.",
+        "Marks are missing: look at the pictures; or the job has too few marks far from each other: "
+        "zeropose plan shows which ones nothing checks."},
+
     CodeText{Code::limit_x, "limit_x", "The object is shifted further along x than the limit allows.",
              "Check how the object stands; change the limit only if the robot can really go there."},
     CodeText{Code::limit_y, "limit_y", "The object is shifted further along y than the limit allows.",

@@ -37,6 +37,7 @@ enum class Code : std::uint16_t {
   not_converged = 402,
   deviation_not_attributable = 403,
   sigma_too_large = 404,
+  hidden_error_too_large = 405,
 
   limit_x = 501,
   limit_y = 502,

@@ -49,7 +49,8 @@ struct Requirements {
   int min_marks = 3;
   int min_marks_per_camera = 0;  // in every camera of the job
   int min_cameras = 1;
-  double max_sigma_mm = 0;  // at every application point, one sigma of the largest direction; 0: not checked
+  double max_sigma_mm = 0;   // at every application point, one sigma of the largest direction; 0: not checked
+  double max_hidden_mm = 0;  // what one wrong mark may do at an application point unnoticed; 0: not checked
   double max_compensation_mm = 5;
   std::array<Range, 6> limits{};
 };

@@ -150,8 +150,12 @@ bool estimate_all(Measurement& measurement, const Job& job, std::span<const Cali
   for (const Deviation& deviation : measurement.pose.deviations)
     if (deviation.used)
       measurement.largest_deviation_mm = std::max(measurement.largest_deviation_mm, deviation.dev_mm.norm());
-  return passes(measurement, {measurement.pose.code, measurement.pose.reason}) &&
-         passes(measurement, check_marks(job, cameras, effective_views(measurement)));
+  if (!passes(measurement, {measurement.pose.code, measurement.pose.reason}) ||
+      !passes(measurement, check_marks(job, cameras, effective_views(measurement))))
+    return false;
+  const Reliability reliability = reliability_of(job, problem, measurement.pose);
+  measurement.hidden_mm = reliability.hidden_mm;
+  return passes(measurement, check_power(job, problem, reliability));
 }
 
 }  // namespace

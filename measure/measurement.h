@@ -27,6 +27,7 @@ struct Measurement {
   Pose X_O0O = Pose::Identity();    // meaningful only when code is ok
   double largest_deviation_mm = 0;  // of the effective marks
   double sigma_mm = 0;              // at the worst application point
+  double hidden_mm = 0;             // what one wrong mark could do at the worst application point unnoticed
 };
 
 // Where find_job_marks() looks: one search per view of the job (the snapshot draws them). The window reaches

@@ -49,12 +49,6 @@ std::string missing_of(const Job& job, std::span<const CalibratedCamera> cameras
   return names.empty() ? "none is missing" : "missing: " + names;
 }
 
-double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
-  Eigen::Matrix<double, 3, 6> J;
-  J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.X_WO.linear() * p_O_mm);
-  return std::sqrt(symmetric_eigen(J * pose.total_covariance * J.transpose()).values.maxCoeff());
-}
-
 struct Place {
   std::string name;
   double sigma_mm = 0;
@@ -62,13 +56,10 @@ struct Place {
 
 Place worst_place(const Job& job, const PoseResult& pose) {
   Place worst;
-  const auto consider = [&](const std::string& name, const Eigen::Vector3d& p_O_mm) {
-    const double sigma_mm = sigma_at_mm(pose, p_O_mm);
-    if (!(sigma_mm <= worst.sigma_mm)) worst = {name, sigma_mm};
-  };
-  for (const ApplicationPoint& point : job.application_points) consider(point.name, point.p_O_mm);
-  if (job.application_points.empty())
-    for (const Mark& mark : job.marks) consider(mark.name, mark.p_O_mm);
+  for (const ApplicationPoint& point : points_that_count(job)) {
+    const double sigma_mm = sigma_at_mm(pose, point.p_O_mm);
+    if (!(sigma_mm <= worst.sigma_mm)) worst = {point.name, sigma_mm};
+  }
   return worst;
 }
 
@@ -118,6 +109,19 @@ Verdict check_marks(const Job& job, std::span<const CalibratedCamera> cameras, s
   return good();
 }
 
+std::vector<ApplicationPoint> points_that_count(const Job& job) {
+  if (!job.application_points.empty()) return job.application_points;
+  std::vector<ApplicationPoint> points;
+  for (const Mark& mark : job.marks) points.push_back({mark.name, mark.p_O_mm});
+  return points;
+}
+
+double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
+  Eigen::Matrix<double, 3, 6> J;
+  J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.X_WO.linear() * p_O_mm);
+  return std::sqrt(symmetric_eigen(J * pose.total_covariance * J.transpose()).values.maxCoeff());
+}
+
 double worst_sigma_mm(const Job& job, const PoseResult& pose) { return worst_place(job, pose).sigma_mm; }
 
 Verdict check_sigma(const Job& job, const PoseResult& pose) {
@@ -127,6 +131,28 @@ Verdict check_sigma(const Job& job, const PoseResult& pose) {
   if (worst.sigma_mm <= limit) return good();
   return {Code::sigma_too_large, "sigma at " + worst.name + " is " + number(worst.sigma_mm, 3) +
                                      " mm, allowed are " + number(limit, 3) + " mm"};
+}
+
+Reliability reliability_of(const Job& job, const PoseProblem& problem, const PoseResult& pose) {
+  std::vector<Eigen::Vector3d> points_O_mm;
+  for (const ApplicationPoint& point : points_that_count(job)) points_O_mm.push_back(point.p_O_mm);
+  return reliability_of(problem, pose, points_O_mm);
+}
+
+Verdict check_power(const Job& job, const PoseProblem& problem, const Reliability& reliability) {
+  const double limit = job.requirements.max_hidden_mm;
+  if (limit == 0 || reliability.hidden_mm <= limit) return good();
+  const ObservationReliability& worst = reliability.observations[reliability.worst];
+  const Observation& observation = problem.observations[worst.observation];
+  const std::string whose =
+      "mark " + job.marks[observation.mark].name + " in " + problem.cameras[observation.camera].name;
+  if (!std::isfinite(worst.hidden_mm))
+    return {Code::hidden_error_too_large,
+            "nothing checks " + whose + ": were it wrong, nobody would notice; more marks are needed"};
+  return {Code::hidden_error_too_large,
+          whose + " could be wrong by " + number(worst.detectable_px) + " px and move " +
+              points_that_count(job)[worst.worst_point].name + " by " + number(worst.hidden_mm, 3) +
+              " mm without being noticed, allowed are " + number(limit, 3) + " mm"};
 }
 
 Verdict check_limits(const Requirements& requirements, const Pose& X_O0O) {

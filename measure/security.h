@@ -4,11 +4,13 @@
 
 #include <span>
 #include <string>
+#include <vector>
 
 #include "measure/code.h"
 #include "measure/image.h"
 #include "measure/job.h"
 #include "measure/pose.h"
+#include "measure/reliability.h"
 
 namespace zeropose {
 
@@ -25,12 +27,25 @@ Verdict check_image(const ImageView& image, const std::string& name);
 // do not. The reason lists the views that are missing.
 Verdict check_marks(const Job& job, std::span<const CalibratedCamera> cameras, std::span<const View> used);
 
-// The largest sigma, mm, of a pose's error at an application point in any direction, at the worst point;
-// without application points: at the worst mark. From the total covariance.
+// The application points of a job; without any, its marks.
+std::vector<ApplicationPoint> points_that_count(const Job& job);
+
+// Sigma, mm, of a pose's error at a point of the object, in the direction in which it is largest. From the
+// total covariance.
+double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm);
+
+// The largest of them over the points that count.
 double worst_sigma_mm(const Job& job, const PoseResult& pose);
 
 // M6.4.
 Verdict check_sigma(const Job& job, const PoseResult& pose);
+
+// The power of M6.3 at the points that count.
+Reliability reliability_of(const Job& job, const PoseProblem& problem, const PoseResult& pose);
+
+// The last part of M6.3: no single wrong mark may move an application point by more than max_hidden_mm
+// without being noticed. `problem` is what `reliability` was reckoned from.
+Verdict check_power(const Job& job, const PoseProblem& problem, const Reliability& reliability);
 
 // M6.5: each of x y z rx ry rz of X_O0O within its range, ends included.
 Verdict check_limits(const Requirements& requirements, const Pose& X_O0O);

@@ -51,6 +51,7 @@ void read_requirements(const json& entry, Job& job) {
   job.requirements.min_marks_per_camera = needed.at("min_marks_per_camera");
   job.requirements.min_cameras = needed.at("min_cameras");
   job.requirements.max_sigma_mm = needed.at("max_sigma_mm");
+  job.requirements.max_hidden_mm = needed.at("max_hidden_mm");
   job.requirements.max_compensation_mm = needed.at("max_compensation_mm");
   const char* const keys[] = {"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"};
   for (std::size_t i = 0; i < 6; ++i) {
