@@ -241,8 +241,9 @@ TriangulatedPoint triangulate(const TriangulationProblem& problem) {
   std::set<std::size_t> seen_by;
   for (const Observation& observation : problem.observations) seen_by.insert(observation.camera);
   if (seen_by.size() < 2)
-    return failed(Code::too_few_cameras,
-                  "seen by " + number(seen_by.size()) + " cameras, the place of a point needs 2");
+    return failed(Code::too_few_cameras, "seen by " + number(seen_by.size()) +
+                                             (seen_by.size() == 1 ? " camera" : " cameras") +
+                                             ", the place of a point needs 2");
   const std::vector<SightLine> lines = sight_lines(problem);
   const Parallax parallax = best_parallax(lines);
   const auto start = parallax.sigmas() >= least_parallax_sigmas ? nearest_to_all(lines) : std::nullopt;

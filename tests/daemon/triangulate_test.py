@@ -91,7 +91,7 @@ class Triangulate(Case):
         return hole
 
     def test_one_camera(self):
-        self.expect_no_place(self.rows()[:1] + self.rows()[3:], 303, "seen by 1 cameras")
+        self.expect_no_place(self.rows()[:1] + self.rows()[3:], 303, "seen by 1 camera, the place of a point needs 2")
 
     def test_parallel_rays(self):
         far = self.rows({"hole": [0.0, 0.0, 5e6]}, ("left", "right"))

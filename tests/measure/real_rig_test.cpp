@@ -8,6 +8,7 @@
 
 #include "measure/pose.h"
 #include "tests/support/csv.h"
+#include "tests/support/photogrammetric_pose.h"
 #include "tests/support/poses.h"
 #include "tests/support/shared_data.h"
 
@@ -32,20 +33,6 @@ const CameraModel olympus{2272,
                           818.973 - 0.5,
                           BrownConrady{-0.252555, 0.293910, -0.000266, 0.000381, 0}};
 
-// omega phi kappa turn the frame about its axes, the photogrammetrist's camera looks along its -z.
-Pose published_pose(const CsvTable& table, std::size_t row) {
-  const auto turn = [&](const char* name, const Vector3d& axis) {
-    return Eigen::AngleAxisd(-table.number(row, name) / degrees_per_radian, axis).toRotationMatrix();
-  };
-  Pose X_WC = Pose::Identity();
-  X_WC.linear() = (Vector3d(1, -1, -1).asDiagonal() * turn("kappa_deg", Vector3d::UnitZ()) *
-                   turn("phi_deg", Vector3d::UnitY()) * turn("omega_deg", Vector3d::UnitX()))
-                      .transpose();
-  X_WC.translation() =
-      1000 * Vector3d(table.number(row, "Xc_m"), table.number(row, "Yc_m"), table.number(row, "Zc_m"));
-  return X_WC;
-}
-
 struct Sheet {
   std::vector<Mark> marks;
   std::map<int, std::vector<Observation>> seen;  // by view; the camera is not set
@@ -66,7 +53,7 @@ struct Sheet {
           {0, found->second, u, 0.15 * 0.15 * Eigen::Matrix2d::Identity()});
     }
     for (std::size_t row = 0; row < published.size(); ++row)
-      poses[static_cast<int>(published.number(row, "view"))] = published_pose(published, row);
+      poses[static_cast<int>(published.number(row, "view"))] = test::photogrammetric_pose(published, row);
   }
 
   // The pose of the sheet from four views, each with the marks for which `uses` says so.
