@@ -83,6 +83,12 @@ std::optional<Vector2d> undistort(const BrownConrady& lens, const Vector2d& d) {
 
 }  // namespace
 
+CalibratedCamera virtual_camera(const CalibratedCamera& camera_in_hand, const Pose& X_RH) {
+  CalibratedCamera camera = camera_in_hand;
+  camera.X_WC = X_RH * camera_in_hand.X_WC;
+  return camera;
+}
+
 Internals internals_of(const CameraModel& camera) {
   Internals internals = Internals::Zero();
   internals.head<4>() << camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px;

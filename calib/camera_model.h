@@ -39,6 +39,11 @@ struct CalibratedCamera {
   Pose X_WC = Pose::Identity();
 };
 
+// A camera on a robot's hand is another camera at each position of the robot: where the given one, calibrated
+// in the hand's frame (its X_WC is X_HC), stands while the hand is at X_RH. Its pose is then X_RC = X_RH X_HC
+// (spec 50 M3).
+CalibratedCamera virtual_camera(const CalibratedCamera& camera_in_hand, const Pose& X_RH);
+
 struct Projection {
   Eigen::Vector2d u_px;
   Eigen::Matrix<double, 2, 3> du_dp;  // px per mm of p_CQ

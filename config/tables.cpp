@@ -75,6 +75,30 @@ std::vector<Observation> load_observations(const std::filesystem::path& path,
   return observations;
 }
 
+PointObservations load_point_observations(const std::filesystem::path& path,
+                                          std::span<const CalibratedCamera> cameras) {
+  CsvTable table = load_csv(path, {{"camera", "point", "u_px", "v_px"}, {"suu", "svv", "suv"}});
+  PointObservations found;
+  std::set<std::pair<std::size_t, std::size_t>> seen;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    Observation observation;
+    observation.camera = index_of(table, row, "camera", cameras);
+    const std::string point = table.text(row, "point");
+    const auto known = std::ranges::find(found.points, point);
+    observation.mark = static_cast<std::size_t>(known - found.points.begin());
+    if (known == found.points.end()) found.points.push_back(point);
+    observation.u_px = pixel_of(table, row);
+    observation.covariance_px2 = covariance_of(table, row);
+    const bool named = !table.is_blank(row, "camera") && !point.empty();
+    if (named && !seen.emplace(observation.camera, observation.mark).second)
+      table.add_mistake(row, "point", in_quotes(point) + " again in this camera",
+                        "each point once per camera");
+    found.observations.push_back(observation);
+  }
+  table.throw_if_wrong();
+  return found;
+}
+
 std::vector<PointPair> load_point_pairs(const std::filesystem::path& path) {
   CsvTable table = load_csv(path, {{"xa", "ya", "za", "xb", "yb", "zb"}, {"weight"}});
   const auto coordinate = [&](std::size_t row, std::string_view column) {

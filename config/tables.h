@@ -23,6 +23,15 @@ std::vector<Observation> load_observations(const std::filesystem::path& path,
                                            std::span<const CalibratedCamera> cameras,
                                            std::span<const Mark> marks);
 
+// Columns camera point u_px v_px [suu svv suv] as those of marks. Observation::mark is the index into the
+// points, which are in the order in which they first appear.
+struct PointObservations {
+  std::vector<std::string> points;
+  std::vector<Observation> observations;
+};
+PointObservations load_point_observations(const std::filesystem::path& path,
+                                          std::span<const CalibratedCamera> cameras);
+
 // Columns xa ya za xb yb zb [weight], mm.
 std::vector<PointPair> load_point_pairs(const std::filesystem::path& path);
 

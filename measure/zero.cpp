@@ -99,20 +99,19 @@ PoseProblem problem_of(std::span<const CalibratedCamera> cameras, const Job& job
   return problem;
 }
 
-// Standard deviation of the frames' own poses round X_WO0; zero for fewer than two.
+// Standard deviation of the frames' own poses round their mean; zero for fewer than two.
 Vector6 spread_of(std::span<const CalibratedCamera> cameras, const Job& job,
                   std::span<const std::vector<Observation>> frames, const Pose& X_WO0) {
-  std::vector<Vector6> deltas;
+  std::vector<Pose> singles;
   for (const auto& frame : frames) {
     const PoseResult single = estimate_pose(problem_of(cameras, job, frame, X_WO0));
-    if (single.code == Code::ok) deltas.push_back(difference(X_WO0, single.X_WO));
+    if (single.code == Code::ok) singles.push_back(single.X_WO);
   }
-  if (deltas.size() < 2) return Vector6::Zero();
-  const double count = static_cast<double>(deltas.size());
-  Vector6 mean = Vector6::Zero(), squares = Vector6::Zero();
-  for (const Vector6& delta : deltas) mean += delta / count;
-  for (const Vector6& delta : deltas) squares += (delta - mean).cwiseAbs2();
-  return (squares / (count - 1)).cwiseSqrt();
+  if (singles.size() < 2) return Vector6::Zero();
+  const Pose mean_pose = average(singles);
+  Vector6 squares = Vector6::Zero();
+  for (const Pose& X_WO : singles) squares += difference(mean_pose, X_WO).cwiseAbs2();
+  return (squares / static_cast<double>(singles.size() - 1)).cwiseSqrt();
 }
 
 bool valid(std::span<const CalibratedCamera> cameras, const Job& job) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -125,6 +126,52 @@ TEST(Average, LeavesNoMeanDifference) {
   Vector6 sum = Vector6::Zero();
   for (const Pose& X_AB : poses) sum += difference(mean, X_AB);
   EXPECT_LT(sum.norm(), 1e-10);
+}
+
+std::vector<Pose> scattered(Random& random, int count) {
+  const Pose X_AB = test::uniform_pose(random, 1000);
+  std::vector<Pose> poses;
+  for (int i = 0; i < count; ++i) {
+    Vector6 delta;
+    delta << test::uniform_vector(random, 50), test::uniform_vector(random, 0.4);
+    poses.push_back(moved(X_AB, delta));
+  }
+  return poses;
+}
+
+TEST(Average, OfEqualPosesIsThatPose) {
+  Random random(8);
+  const Pose X_AB = test::uniform_pose(random, 1000);
+  test::expect_near(average(std::vector<Pose>(5, X_AB)), X_AB, 1e-11, 1e-11);
+}
+
+TEST(Average, OfTwoIsTheMiddle) {
+  Random random(9);
+  for (int trial = 0; trial < 100; ++trial) {
+    const auto two = scattered(random, 2);
+    const Vector6 way = difference(two[0], two[1]);
+    test::expect_near(average(two), moved(two[0], 0.5 * way), 1e-10, 1e-10);
+  }
+}
+
+TEST(Average, GoesWithTheOuterFrame) {
+  Random random(10);
+  for (int trial = 0; trial < 100; ++trial) {
+    auto poses = scattered(random, 6);
+    const Pose mean = average(poses), X_GA = test::uniform_pose(random, 2000);
+    for (Pose& X_AB : poses) X_AB = X_GA * X_AB;
+    test::expect_near(average(poses), X_GA * mean, 1e-9, 1e-9);
+  }
+}
+
+TEST(Average, DoesNotDependOnTheOrder) {
+  Random random(11);
+  for (int trial = 0; trial < 100; ++trial) {
+    auto poses = scattered(random, 6);
+    const Pose mean = average(poses);
+    std::shuffle(poses.begin(), poses.end(), random);
+    test::expect_near(average(poses), mean, 1e-10, 1e-10);
+  }
 }
 
 TEST(Average, OfOneIsItself) {

@@ -7,6 +7,7 @@
 
 #include "calib/views.h"
 #include "tests/support/csv.h"
+#include "tests/support/photogrammetric_pose.h"
 #include "tests/support/poses.h"
 #include "tests/support/shared_data.h"
 
@@ -60,22 +61,6 @@ TEST(ViewsRealData, ZhangsFiveViews) {
   EXPECT_NEAR(std::get<BrownConrady>(model.distortion).k2, 0.191010, 1e-3);
 }
 
-// omega phi kappa: R = R3(kappa) R2(phi) R1(omega), the photogrammetrist's turns of the frame, z backwards.
-Pose published_pose(const CsvTable& table, std::size_t row) {
-  const auto angle = [&](const char* name) { return table.number(row, name) / degrees_per_radian; };
-  const auto frame_turned = [](double a, const Eigen::Vector3d& axis) {
-    return Eigen::AngleAxisd(-a, axis).toRotationMatrix();
-  };
-  const Eigen::Matrix3d R = frame_turned(angle("kappa_deg"), Eigen::Vector3d::UnitZ()) *
-                            frame_turned(angle("phi_deg"), Eigen::Vector3d::UnitY()) *
-                            frame_turned(angle("omega_deg"), Eigen::Vector3d::UnitX());
-  Pose X_WC = Pose::Identity();
-  X_WC.linear() = (Eigen::Vector3d(1, -1, -1).asDiagonal() * R).transpose();
-  X_WC.translation() =
-      1000 * Eigen::Vector3d(table.number(row, "Xc_m"), table.number(row, "Yc_m"), table.number(row, "Zc_m"));
-  return X_WC;
-}
-
 TEST(ViewsRealData, TwentyOneImagesOfASheet) {
   const auto points = test::shared_data("real/dbat_camcal/points.csv"),
              poses = test::shared_data("real/dbat_camcal/reference_eo_dbat.csv");
@@ -91,8 +76,9 @@ TEST(ViewsRealData, TwentyOneImagesOfASheet) {
     std::size_t v = 0;
     while (input.views[v].name != published.text(row, "view")) ++v;
     const Pose X_BC = result.views[v].X_WB.inverse();
-    EXPECT_LE(test::angle_deg(X_BC, published_pose(published, row)), 0.006);
-    squares += (X_BC.translation() - published_pose(published, row).translation()).array().square() / 21;
+    EXPECT_LE(test::angle_deg(X_BC, test::photogrammetric_pose(published, row)), 0.006);
+    squares +=
+        (X_BC.translation() - test::photogrammetric_pose(published, row).translation()).array().square() / 21;
   }
   EXPECT_LE(squares.sqrt().maxCoeff(), 0.15);  // per axis; the peer: 0.095 0.100 0.061 mm
 }

@@ -164,6 +164,25 @@ TEST(Zero, IsTheMeanOfItsFrames) {
   EXPECT_NEAR(std::sqrt(result.pose.covariance(0, 0)), sigma(0) / std::sqrt(10.0), 0.1 * sigma(0));
 }
 
+// Round the mean of the single frames' poses, whatever the pose of the averaged pixels is.
+TEST(Zero, SpreadIsRoundTheMeanOfTheFrames) {
+  const CellScene scene = test::car_body();
+  test::Random random(6);
+  const auto frames = frames_of(scene, Pose::Identity(), 5, 0.1, random);
+  const ZeroResult result = make_zero(scene.cameras, scene.job, frames);
+  ASSERT_EQ(result.code, Code::ok) << result.reason;
+  const Job job = compensated(scene.job, result.zero);
+  std::vector<Pose> singles;
+  for (const auto& frame : frames) {
+    PoseProblem problem = test::problem_of(scene.cameras, job, frame, result.zero.X_WO0);
+    problem.reject_wrong_marks = false;
+    singles.push_back(estimate_pose(problem).X_WO);
+  }
+  Vector6 squares = Vector6::Zero();
+  for (const Pose& X_WO : singles) squares += difference(average(singles), X_WO).cwiseAbs2() / 4;
+  EXPECT_LT((result.spread - squares.cwiseSqrt()).norm(), 1e-12);
+}
+
 TEST(Zero, OfOneFrameHasNoSpread) {
   const CellScene scene = test::car_body();
   test::Random random(2);
