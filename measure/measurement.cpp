@@ -8,6 +8,7 @@
 #include "calib/words.h"
 #include "measure/association.h"
 #include "measure/security.h"
+#include "measure/sharpness.h"
 
 namespace zeropose {
 namespace {
@@ -138,6 +139,24 @@ struct Spoilt {
 constexpr std::array spoilt_by{Spoilt{MarkStatus::blurred, Code::image_blurred},
                                Spoilt{MarkStatus::saturated, Code::image_saturated}};
 
+// The findings, with blurred for what was not found in a window without a sharp edge: beyond some blur the
+// finder sees no mark that it could call so.
+std::vector<MarkFinding> with_blur(std::vector<MarkFinding> findings, std::span<const CameraImage> images,
+                                   const Job& job, std::span<const MarkSearch> searches) {
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    MarkFinding& finding = findings[i];
+    const ImageView* image = image_of(images, job.views[i].camera);
+    if (finding.status == MarkStatus::found || finding.status == MarkStatus::blurred || image == nullptr)
+      continue;
+    const auto blur_px = sharpest_edge_px(*image, window_of(*image, searches[i]));
+    if (!blur_px || !(*blur_px > searches[i].max_blur_px)) continue;
+    finding.status = MarkStatus::blurred;
+    finding.blur_px = *blur_px;
+    finding.u_px = searches[i].expected_px;
+  }
+  return findings;
+}
+
 // The verdict on the pictures where the requirements fail only because of marks that pictures spoil; else
 // nothing. Names the view that is spoilt most; of two reasons the one that spoils more views.
 std::optional<Verdict> spoilt_pictures(const Job& job, std::span<const CalibratedCamera> cameras,
@@ -183,8 +202,8 @@ bool find_all(Measurement& measurement, std::span<const CameraImage> images, con
   Verdict verdict = check_marks(job, cameras, found_views(job, measurement.findings));
   if (verdict.code != Code::ok) {
     const auto searches = job_searches(job, cameras, X_WO_expected);
-    if (auto spoilt = spoilt_pictures(job, cameras, measurement.findings, searches))
-      verdict = std::move(*spoilt);
+    const auto seen = with_blur(measurement.findings, images, job, searches);
+    if (auto spoilt = spoilt_pictures(job, cameras, seen, searches)) verdict = std::move(*spoilt);
     const std::string misses = misses_of(job, measurement.findings, searches);
     if (!misses.empty()) verdict.reason += " (" + misses + ")";
   }

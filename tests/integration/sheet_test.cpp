@@ -82,7 +82,7 @@ TEST_F(RenderedSheet, KeepsItsLimitsAndItsStep) {
     EXPECT_EQ(code(job, std::nullopt), expected);
   }
   Job job = sheet.job;
-  job.requirements.max_displacement_mm = 40;  // 36 mm and 0.5 deg over 4.6 m
+  job.requirements.max_displacement_mm = 35;  // the first end goes 36 mm
   EXPECT_EQ(code(job, std::nullopt), Code::limit_displacement);
   job = sheet.job;
   job.requirements.max_step_mm = 10;

@@ -21,7 +21,7 @@ struct Edge {
   double limit, digit;
   bool both_signs;
   Code code;
-  Code code_of_none;  // for NaN and infinity; of a rotation that is none the first axis speaks
+  Code code_of_none;  // for NaN and infinity; of a rotation that is none ry speaks
   std::function<Verdict(double)> check;
 };
 
@@ -71,14 +71,14 @@ Edge length(const char* name, double limit, Code code, std::function<Verdict(dou
 }
 
 std::vector<Edge> edges() {
-  const Code rx = Code::limit_rx;
+  const Code rx = Code::limit_rx, none = Code::limit_ry;
   return {
       axis("x", 40, mm_digit, Code::limit_x, Code::limit_x, [](double v) { return six(v, 0, 0, 0, 0, 0); }),
       axis("y", 40, mm_digit, Code::limit_y, Code::limit_y, [](double v) { return six(0, v, 0, 0, 0, 0); }),
       axis("z", 40, mm_digit, Code::limit_z, Code::limit_z, [](double v) { return six(0, 0, v, 0, 0, 0); }),
-      axis("rx", 0.5, deg_digit, rx, rx, [](double v) { return six(0, 0, 0, v, 0.3, -0.4); }),
-      axis("ry", 0.5, deg_digit, Code::limit_ry, rx, [](double v) { return six(0, 0, 0, 0.3, v, -0.4); }),
-      axis("rz", 0.5, deg_digit, Code::limit_rz, rx, [](double v) { return six(0, 0, 0, 0.3, -0.4, v); }),
+      axis("rx", 0.5, deg_digit, rx, none, [](double v) { return six(0, 0, 0, v, 0.3, -0.4); }),
+      axis("ry", 0.5, deg_digit, Code::limit_ry, none, [](double v) { return six(0, 0, 0, 0.3, v, -0.4); }),
+      axis("rz", 0.5, deg_digit, Code::limit_rz, none, [](double v) { return six(0, 0, 0, 0.3, -0.4, v); }),
       length("displacement_by_a_shift", 40, Code::limit_displacement,
              [](double v) { return check_displacement(job_with_points(), slid(first, v)); }),
       length("displacement_by_a_turn", 40, Code::limit_displacement,

@@ -19,9 +19,10 @@ class SceneRenderer {
       renderers_.emplace_back(scene, camera);
   }
 
-  std::vector<CleanPicture> clean(const Pose& X_WO) const {
+  std::vector<CleanPicture> clean(const Pose& X_WO, const Faults& faults = {}) const {
     std::vector<CleanPicture> pictures;
-    for (const CameraRenderer& renderer : renderers_) pictures.push_back(renderer.clean_picture(X_WO));
+    for (const CameraRenderer& renderer : renderers_)
+      pictures.push_back(renderer.clean_picture(X_WO, faults));
     return pictures;
   }
   const std::vector<CalibratedCamera>& cameras() const { return cameras_; }
