@@ -65,16 +65,19 @@ CameraOptions read_camera_options(JsonObject& object) {
   return camera;
 }
 
-// A normal of length 1 within 1 %, then exactly 1.
+// A direction of length 1 within 1 %, then exactly 1.
+void take_direction(JsonObject& object, std::string_view key, const Eigen::Vector3d& given,
+                    Eigen::Vector3d& direction) {
+  if (std::abs(given.norm() - 1) > 0.01)
+    object.add_mistake(key, concat({"a vector of length ", std::to_string(given.norm())}),
+                       "a unit vector (length 0.99 to 1.01)");
+  else
+    direction = given.normalized();
+}
+
 void read_normal(JsonObject& object, Eigen::Vector3d& normal_O) {
   Eigen::Vector3d given;
-  if (!object.read_optional("normal", given, 2.0)) return;
-  if (std::abs(given.norm() - 1) > 0.01) {
-    object.add_mistake("normal", concat({"a vector of length ", std::to_string(given.norm())}),
-                       "a unit vector (length 0.99 to 1.01)");
-    return;
-  }
-  normal_O = given.normalized();
+  if (object.read_optional("normal", given, 2.0)) take_direction(object, "normal", given, normal_O);
 }
 
 // The cameras of a mark by name; indices are found once the file is read.
@@ -117,12 +120,15 @@ NamedMark read_mark(JsonObject& object) {
 }
 
 void read_requirements(JsonObject& object, Requirements& requirements) {
-  object.read("min_marks", requirements.min_marks, 3, 10000);
+  object.read("min_marks", requirements.min_marks, 2, 10000);
   object.read_optional("min_marks_per_camera", requirements.min_marks_per_camera, 0, 10000);
   object.read_optional("min_cameras", requirements.min_cameras, 1, 1000);
   object.read("max_sigma_mm", requirements.max_sigma_mm, NumberRange{0, 100, true});
   object.read_optional("max_hidden_mm", requirements.max_hidden_mm, NumberRange{0, 1000, true});
   object.read_optional("max_compensation_mm", requirements.max_compensation_mm, NumberRange{0, 100});
+  object.read_optional("max_displacement_mm", requirements.max_displacement_mm, NumberRange{0, 10000});
+  object.read_optional("max_step_mm", requirements.max_step_mm, NumberRange{0, 10000});
+  object.read_optional("max_step_deg", requirements.max_step_deg, NumberRange{0, 180});
 }
 
 void read_limits(JsonObject& object, std::array<Range, 6>& limits) {
@@ -162,9 +168,11 @@ Job read_job(JsonObject& object, const std::vector<CameraOptions>& cameras) {
   object.read("name", job.name);
   object.read("number", job.number, 1, 65535);
   object.read("nominal_pose", job.X_WO_nominal);
+  Pose X_WP = Pose::Identity();
+  if (object.read_optional("planar", X_WP)) job.X_WP_planar = X_WP;
   object.read("search_mm", job.search_mm, NumberRange{0, 10000, true});
   object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
-  object.read_each("marks", 3, [&](JsonObject& member) {
+  object.read_each("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
     const NamedMark named = read_mark(member);
     add_views(member, named, cameras, job);
     job.marks.push_back(named.mark);
@@ -184,6 +192,14 @@ void read_link(JsonObject& object, RobotOptions& robot) {
   read_address(object, "address", robot.address);
   if (object.read("port", port, 1, 65535)) robot.port = static_cast<std::uint16_t>(port);
   if (object.read_optional("unit", unit, 0, 255)) robot.unit = static_cast<std::uint8_t>(unit);
+}
+
+LinearAxis read_axis(JsonObject& object) {
+  LinearAxis axis;
+  Eigen::Vector3d given;
+  if (object.read("direction", given, 2.0)) take_direction(object, "direction", given, axis.direction_W);
+  object.read("zero_mm", axis.zero_mm, NumberRange{-largest_mm, largest_mm});
+  return axis;
 }
 
 // The conventions that go over the wire: all but the matrix.
@@ -207,6 +223,7 @@ RobotOptions read_robot(JsonObject& object) {
     robot.convention = convention_named(conventions[index]).value_or(Convention::generic);
   if (object.read_word("frame", frame_names, index)) robot.frame = static_cast<CorrectionFrame>(index + 1);
   object.read("pose_in_world", robot.X_WR);
+  object.read_optional("axis", [&](JsonObject& axis) { robot.axis = read_axis(axis); });
   read_milliseconds(object, "validity_ms", robot.validity, 50, 65535);
   object.read_optional("require_command_crc", robot.require_command_crc);
   read_addresses(object, "allowed_writers", robot.allowed_writers);

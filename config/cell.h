@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -24,7 +25,8 @@ struct RobotOptions {
   std::uint8_t unit = 1;
   Convention convention = Convention::generic;
   CorrectionFrame frame = CorrectionFrame::object_zero;
-  Pose X_WR = Pose::Identity();
+  Pose X_WR = Pose::Identity();    // on an axis: where the base was taught
+  std::optional<LinearAxis> axis;  // that the base rides on; its position comes with Measure
   std::chrono::milliseconds validity{2000};
   bool require_command_crc = true;
   std::vector<std::string> allowed_writers;  // addresses; empty: any

@@ -2,11 +2,15 @@
 #include "config/text.h"
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
 namespace zeropose {
 namespace {
+
+// As exactly as the numbers of a file can say it.
+constexpr double in_plane_mm = 1e-3, in_plane_deg = 1e-4;
 
 // Every element whose key (an empty one is left out) an earlier element has too.
 template <typename Elements, typename KeyOf>
@@ -41,11 +45,26 @@ std::map<std::size_t, int> marks_per_camera(const Job& job) {
   return count;
 }
 
+// A sheet moves in its plane only: what does not begin in it is never found.
+void check_plane(const Job& job, const std::string& path, JsonReading& reading) {
+  if (!job.X_WP_planar) return;
+  const SixNumbers six = to_six_numbers(job.X_WP_planar->inverse() * job.X_WO_nominal);
+  const double tilt_deg = std::hypot(six.rx_deg, six.ry_deg);
+  if (std::abs(six.z_mm) > in_plane_mm || tilt_deg > in_plane_deg)
+    reading.add_mistake(path + ".nominal_pose",
+                        concat({"a pose ", std::to_string(six.z_mm), " mm above the plane, tilted by ",
+                                std::to_string(tilt_deg), " deg"}),
+                        "one that lies in the plane of planar (its z, rx and ry are 0 there)");
+}
+
 void check_requirements(const Job& job, const std::string& path, const std::vector<CameraOptions>& cameras,
                         JsonReading& reading) {
   const Requirements& needed = job.requirements;
+  if (needed.min_marks < least_marks(job))
+    reading.add_mistake(path + ".requirements.min_marks", std::to_string(needed.min_marks),
+                        "at least 3; 2 suffice in a job that is planar");
   const auto marks = std::ranges::count_if(job.marks, [](const Mark& mark) { return mark.weight > 0; });
-  if (job.marks.size() >= 3 && needed.min_marks > marks)
+  if (static_cast<int>(job.marks.size()) >= least_marks(job) && needed.min_marks > marks)
     reading.add_mistake(path + ".requirements.min_marks", std::to_string(needed.min_marks),
                         concat({"at most the ", std::to_string(marks), " marks with a weight above 0"}));
   const std::map<std::size_t, int> per_camera = marks_per_camera(job);
@@ -73,6 +92,7 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
     check_unique(cell.jobs[i].marks, path + ".marks", "name", name_in_quotes, reading);
     check_unique(cell.jobs[i].application_points, path + ".application_points", "name", name_in_quotes,
                  reading);
+    check_plane(cell.jobs[i], path, reading);
     check_requirements(cell.jobs[i], path, cell.cameras, reading);
   }
 }

@@ -114,6 +114,18 @@ ZeroRecord zero_of(const JsonValue& content, const std::string& file, const std:
   return record;
 }
 
+// What it was made with that is another one now, or nothing.
+std::string why_outdated(const ZeroRecord& record, const Cell& cell, const Job& job) {
+  const bool config = record.config_hash != cell.config_hash;
+  const bool calibration = record.calibration_hash != cell.calibration_hash;
+  if (config && calibration) return "another cell file and another calibration";
+  if (config) return "another cell file";
+  if (calibration) return "another calibration";
+  const std::size_t marks = record.zero.compensation_O_mm.size();
+  if (marks == job.marks.size()) return {};
+  return concat({std::to_string(marks), " marks, the job has ", std::to_string(job.marks.size())});
+}
+
 // Letters, digits, '-' and '_' stay; long names are cut and told apart by a hash.
 std::string file_name_of(const std::string& name) {
   constexpr std::size_t longest = 120;
@@ -156,6 +168,26 @@ std::optional<ZeroRecord> load_zero(const std::filesystem::path& directory, cons
   ZeroRecord record = zero_of(loaded->content, path.string(), job);
   record.id = loaded->id;
   return record;
+}
+
+StoredZero load_zero_for(const std::filesystem::path& directory, const Cell& cell, const Job& job) {
+  StoredZero stored;
+  try {
+    stored.record = load_zero(directory, job.name);
+  } catch (const std::exception& error) {
+    return {Code::storage_failed,
+            concat({"the zero measurement of job ", job.name, " cannot be used: ", error.what()}),
+            {}};
+  }
+  if (!stored.record)
+    return {Code::zero_missing, concat({"no zero measurement was made for job ", job.name}), {}};
+  if (std::string why = why_outdated(*stored.record, cell, job); !why.empty())
+    return {Code::zero_outdated,
+            concat({"the zero measurement of job ", job.name, " of ", stored.record->time_utc,
+                    " was made with ", why}),
+            {}};
+  stored.code = Code::ok;
+  return stored;
 }
 
 std::string iso8601_utc(std::chrono::system_clock::time_point time) {

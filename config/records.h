@@ -8,6 +8,7 @@
 #include <string>
 
 #include "config/atomic_file.h"
+#include "config/cell.h"
 #include "config/config_error.h"
 #include "measure/zero.h"
 
@@ -31,6 +32,18 @@ std::uint32_t save_zero(const std::filesystem::path& directory, const ZeroRecord
 
 // nullopt: there is none. Throws ConfigError when there is one but it cannot be trusted.
 std::optional<ZeroRecord> load_zero(const std::filesystem::path& directory, const std::string& job);
+
+// A job's zero as far as a cell may use it (spec 85 R20).
+struct StoredZero {
+  Code code = Code::internal;
+  std::string reason;                // one sentence, empty when ok
+  std::optional<ZeroRecord> record;  // only when ok
+};
+
+// Codes: zero_missing (there is none), storage_failed (it is damaged or cannot be read), zero_outdated (made
+// with another cell file or another calibration, or for another number of marks). Never throws for what a
+// file can be.
+StoredZero load_zero_for(const std::filesystem::path& directory, const Cell& cell, const Job& job);
 
 // Where the zero of a job lies: zero-JOB.json, other bytes than letters, digits, '-', '_' as %XX.
 std::filesystem::path zero_path(const std::filesystem::path& directory, const std::string& job);

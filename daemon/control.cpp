@@ -52,10 +52,15 @@ Json status_answer(Cycle& cycle) {
                        {"frames", camera.statistics.frames},
                        {"timeouts", camera.statistics.timeouts},
                        {"damaged", camera.statistics.damaged}});
-  Json answer{
-      {"status", "ok"},     {"cell", cycle.cell().name}, {"simulated", cycle.cell().simulated},
-      {"job", status.job},  {"ready", status.ready},     {"cameras_known", status.cameras_known},
-      {"cameras", cameras}, {"cycles", status.cycles},   {"zero_state", verdict(status.zero_code, "")}};
+  Json answer{{"status", "ok"},
+              {"cell", cycle.cell().name},
+              {"simulated", cycle.cell().simulated},
+              {"job", status.job},
+              {"ready", status.ready},
+              {"cameras_known", status.cameras_known},
+              {"cameras", cameras},
+              {"cycles", status.cycles},
+              {"zero_state", verdict(status.zero_code, status.zero_reason)}};
   if (status.zero) answer["zero"] = zero_json(*status.zero);
   return answer;
 }

@@ -50,6 +50,22 @@ Failure take_frames(std::vector<GrabResult>& results, std::vector<Frame>& frames
   return failure;
 }
 
+// As take_frames(), and a camera that repeats its picture fails as well.
+Failure take_live_frames(std::span<const std::size_t> cameras, std::vector<GrabResult>& results,
+                         FrozenPictures& pictures, std::vector<Frame>& frames) {
+  Failure failure = take_frames(results, frames);
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (pictures.repeats(cameras[i], frames[i]) && failure.code == Code::ok)
+      failure = {Code::frame_frozen, frames[i].camera + " delivered the same picture as before, bit for bit"};
+  return failure;
+}
+
+// Where the robot's base stands as the request says. Without an axis the argument means nothing.
+Pose base_of(const RobotOptions& robot, const Request& request) {
+  constexpr double mm_per_um = 1e-3;
+  return robot.axis ? base_at(*robot.axis, robot.X_WR, mm_per_um * request.argument) : robot.X_WR;
+}
+
 void log_change(const CameraStatus& camera) {
   if (camera.state == CameraState::alive)
     spdlog::info("{} is there", camera.name);
@@ -70,41 +86,24 @@ ImageView view_of(const Frame& frame) {
 }
 
 Cycle::Cycle(Cell cell, std::filesystem::path state)
-    : cell_(std::move(cell)), state_(std::move(state)), grabber_(cell_.cameras) {
+    : cell_(std::move(cell)),
+      state_(std::move(state)),
+      grabber_(cell_.cameras),
+      pictures_(cell_.cameras.size()) {
   load_zeros();
 }
 
 Cycle::~Cycle() { stop(); }
 
-// A damaged zero is no reason not to run: the cell is not ready and says so.
-std::optional<ZeroRecord> Cycle::load_or_complain(const Job& job, Code& code) const {
-  try {
-    return load_zero(state_, job.name);
-  } catch (const std::exception& error) {
-    spdlog::error("the zero of job {} cannot be used: {}", job.name, error.what());
-    code = Code::storage_failed;
-    return std::nullopt;
-  }
-}
-
+// A zero that cannot be used is no reason not to run: the cell is not ready and says so.
 void Cycle::load_zeros() {
   std::filesystem::create_directories(state_);
-  zeros_.resize(cell_.jobs.size());
-  zero_codes_.assign(cell_.jobs.size(), Code::zero_missing);
-  for (std::size_t i = 0; i < cell_.jobs.size(); ++i) {
-    const auto record = load_or_complain(cell_.jobs[i], zero_codes_[i]);
-    if (!record) continue;
-    const bool current =
-        record->config_hash == cell_.config_hash && record->calibration_hash == cell_.calibration_hash;
-    zero_codes_[i] = current ? Code::ok : Code::zero_outdated;
-    if (current) {
-      zeros_[i] = record;
-      spdlog::info("job {}: zero {} of {}", cell_.jobs[i].name, hex(record->id), record->time_utc);
-    } else {
-      spdlog::warn(
-          "job {}: the zero of {} belongs to another config or calibration and is not used; take a new zero",
-          cell_.jobs[i].name, record->time_utc);
-    }
+  for (const Job& job : cell_.jobs) {
+    const StoredZero& zero = zeros_.emplace_back(load_zero_for(state_, cell_, job));
+    if (zero.record)
+      spdlog::info("job {}: zero {} of {}", job.name, hex(zero.record->id), zero.record->time_utc);
+    else
+      spdlog::warn("{}; take a new zero", zero.reason);
   }
 }
 
@@ -172,8 +171,9 @@ void Cycle::refresh() {
   const Job& job = cell_.jobs[selected_];
   Status now;
   now.job = job.name;
-  now.zero = zeros_[selected_];
-  now.zero_code = zero_codes_[selected_];
+  now.zero = zeros_[selected_].record;
+  now.zero_code = zeros_[selected_].code;
+  now.zero_reason = zeros_[selected_].reason;
   now.cameras_known = true;
   for (std::size_t i = 0; i < grabber_.size(); ++i) {
     const CameraWorker& worker = grabber_.camera(i);
@@ -208,7 +208,10 @@ Status Cycle::status() const {
 }
 
 void Cycle::carry_out(const Request& request) {
-  if (request.kind == CommandKind::reset) return refresh();  // the handshake answers it by itself
+  if (request.kind == CommandKind::reset) {  // the handshake answers it by itself
+    X_O0O_last_.reset();
+    return refresh();
+  }
   Report report;
   try {
     report = report_for(request);
@@ -243,7 +246,9 @@ Report Cycle::report_for(const Request& request) {
       report.largest_deviation_mm = m.largest_deviation_mm;
       report.sigma_mm = m.sigma_mm;
       if (m.code == Code::ok)
-        report.correction = correction(robot.frame, robot.X_WR, zeros_[selected_]->zero.X_WO0, m.pose.X_WO);
+        report.correction = correction(robot.frame, base_of(robot, request),
+                                       zeros_[selected_].record->zero.X_WO0, m.pose.X_WO);
+      if (m.code == Code::ok && Clock::now() < request.deadline) X_O0O_last_ = m.X_O0O;
       spdlog::info("{} request {}: code {} {}{}, grab {} us, compute {} us", robot.name, request.id,
                    static_cast<int>(m.code), text_of(m.code).name,
                    m.reason.empty() ? "" : " (" + m.reason + ")", microseconds(outcome.grab),
@@ -259,7 +264,7 @@ Report Cycle::report_for(const Request& request) {
       const auto job = std::find_if(cell_.jobs.begin(), cell_.jobs.end(),
                                     [&](const Job& j) { return j.number == request.job; });
       report.code = job == cell_.jobs.end() ? Code::unknown_job : Code::ok;
-      if (job != cell_.jobs.end()) selected_ = static_cast<std::size_t>(job - cell_.jobs.begin());
+      if (job != cell_.jobs.end()) select(static_cast<std::size_t>(job - cell_.jobs.begin()));
       return report;
     }
     default:
@@ -268,15 +273,20 @@ Report Cycle::report_for(const Request& request) {
   }
 }
 
+void Cycle::select(std::size_t job) {
+  if (job != selected_) X_O0O_last_.reset();
+  selected_ = job;
+}
+
 MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& on_exposed) {
   const Job& job = cell_.jobs[selected_];
   MeasureOutcome outcome;
   outcome.job = &job;
   Measurement& m = outcome.measurement;
-  const auto& zero = zeros_[selected_];
+  const auto& zero = zeros_[selected_].record;
   if (!zero) {
-    m.code = zero_codes_[selected_];
-    m.reason = "job " + job.name + " has no valid zero";
+    m.code = zeros_[selected_].code;
+    m.reason = zeros_[selected_].reason;
     return outcome;
   }
   const auto cameras = cameras_of(job);
@@ -284,13 +294,15 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
   auto results = grabber_.grab(cameras, deadline - compute_reserve);
   const auto grabbed = Clock::now();
   outcome.grab = grabbed - start;
-  if (const Failure failure = take_frames(results, outcome.frames); failure.code != Code::ok) {
+  if (const Failure failure = take_live_frames(cameras, results, pictures_, outcome.frames);
+      failure.code != Code::ok) {
     m.code = failure.code;
     m.reason = failure.reason;
     return outcome;
   }
   on_exposed();
-  m = zeropose::measure({images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero});
+  m = zeropose::measure(
+      {images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero, X_O0O_last_});
   outcome.compute = Clock::now() - grabbed;
   return outcome;
 }
@@ -304,7 +316,8 @@ ZeroOutcome Cycle::take_zero(TimePoint deadline) {
     std::vector<Frame> frames;
     auto results =
         grabber_.grab(cameras, std::min(deadline - compute_reserve, Clock::now() + cell_.deadline));
-    if (const Failure failure = take_frames(results, frames); failure.code != Code::ok)
+    if (const Failure failure = take_live_frames(cameras, results, pictures_, frames);
+        failure.code != Code::ok)
       return {failure.code, failure.reason, {}, Vector6::Zero()};
     const auto findings =
         find_job_marks(images_of(cameras, frames), job, cell_.calibration, job.X_WO_nominal);
@@ -334,8 +347,9 @@ void Cycle::keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome)
     outcome.reason = error.what();
     return;
   }
-  outcome.record = zeros_[selected_] = record;
-  zero_codes_[selected_] = Code::ok;
+  outcome.record = record;
+  zeros_[selected_] = {Code::ok, {}, record};
+  X_O0O_last_.reset();
   spdlog::info("job {}: zero {} taken", job.name, hex(record.id));
 }
 
@@ -360,7 +374,7 @@ Snapshot Cycle::snapshot(std::size_t camera) {
   const std::size_t cameras[] = {camera};
   Snapshot snapshot{std::move(grabber_.grab(cameras, Clock::now() + cell_.deadline).front()), {}};
   if (snapshot.grabbed.status != GrabStatus::ok) return snapshot;
-  const auto& zero = zeros_[selected_];
+  const auto& zero = zeros_[selected_].record;
   const Pose X_WO_expected = zero ? zero->zero.X_WO0 : job.X_WO_nominal;
   const auto searches = job_searches(job, cell_.calibration, X_WO_expected);
   const auto findings =

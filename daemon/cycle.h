@@ -13,6 +13,7 @@
 
 #include "config/cell.h"
 #include "config/records.h"
+#include "daemon/frozen_pictures.h"
 #include "daemon/grab.h"
 #include "daemon/overlay.h"
 #include "measure/measurement.h"
@@ -52,6 +53,7 @@ struct Status {
   std::string job;
   bool ready = false;  // a Measure would be taken now
   Code zero_code = Code::zero_missing;
+  std::string zero_reason;  // why there is none, one sentence
   std::optional<ZeroRecord> zero;
   std::vector<CameraStatus> cameras;
   bool cameras_known = false;  // every camera was tried at least once
@@ -97,22 +99,25 @@ class Cycle {
 
   void carry_out(const Request& request);
   Report report_for(const Request& request);
+  void select(std::size_t job);
   MeasureOutcome measure(TimePoint deadline, const std::function<void()>& on_exposed);
   ZeroOutcome take_zero(TimePoint deadline);
   void keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome);
   Snapshot snapshot(std::size_t camera);
   void load_zeros();
-  std::optional<ZeroRecord> load_or_complain(const Job& job, Code& code) const;
 
   const Cell cell_;
   const std::filesystem::path state_;
   std::vector<RobotLink*> links_;
   Grabber grabber_;
+  FrozenPictures pictures_;
 
   // Only the cycle thread touches these once it runs.
-  std::size_t selected_ = 0;                      // job
-  std::vector<std::optional<ZeroRecord>> zeros_;  // one per job
-  std::vector<Code> zero_codes_;                  // why there is none
+  std::size_t selected_ = 0;       // job
+  std::vector<StoredZero> zeros_;  // one per job
+  // The last result that a robot was sent as valid: what the step limit compares with. None after the start,
+  // a new zero, a change of job and a Reset.
+  std::optional<Pose> X_O0O_last_;
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

@@ -24,6 +24,7 @@ double misfit_of(const Job& job, std::span<const CalibratedCamera> cameras,
   problem.marks = job.marks;
   problem.observations = observations;
   problem.X_WO_start = X_WO_start;
+  problem.X_WP_planar = job.X_WP_planar;
   problem.system_sigma_px = job.system_sigma_px;
   problem.reject_wrong_marks = false;
   const PoseResult pose = estimate_pose(problem);

@@ -43,10 +43,19 @@ constexpr std::array table{
     CodeText{
         Code::result_timeout, "result_timeout", "The result was not ready at the deadline.",
         "Compare the times in the log with the deadline in the cell file; look for load on the computer."},
-    CodeText{Code::image_saturated, "image_saturated", "A large part of a picture is white.",
+    CodeText{
+        Code::frame_frozen, "frame_frozen",
+        "A camera delivered the same picture as before, bit for bit: it does not show what is there now.",
+        "Switch the camera off and on again; if it comes back, update its firmware or exchange it."},
+    CodeText{Code::image_saturated, "image_saturated",
+             "A large part of a picture is white, or so many marks are that too few are left.",
              "Look for sunlight or a reflection; shorten the exposure time or close the iris."},
     CodeText{Code::image_dark, "image_dark", "A picture is almost black.",
              "Check the lamp, the lens cap and whether something stands in front of the camera."},
+    CodeText{
+        Code::image_blurred, "image_blurred", "Marks in a picture are so blurred that too few are left.",
+        "Focus the lens, clean it, check that it is screwed tight; did the object still move, or does the "
+        "camera shake? Then wait longer, or shorten the exposure time."},
 
     CodeText{Code::too_few_marks, "too_few_marks", "Fewer marks were found than the job requires.",
              "Look at the pictures: is the object there, are marks covered, dirty or badly lit? Which ones "
@@ -102,14 +111,28 @@ constexpr std::array table{
     CodeText{Code::value_out_of_range, "value_out_of_range",
              "A value of the correction does not fit into the robot's number format.",
              "Check the frame and the robot's pose in the cell file: the correction is implausibly large."},
+    CodeText{
+        Code::limit_displacement, "limit_displacement",
+        "An application point is displaced further than the job allows.",
+        "Check how the object stands; the reason names the point. Change the limit only if the robot can "
+        "really go there."},
+    CodeText{
+        Code::step_too_large, "step_too_large",
+        "The object stands further from where the last valid result put it than the job allows.",
+        "Check how the object stands and whether it is the right one. If the jump is wanted, let the robot "
+        "send Reset, select another job or take a new zero: the next result is then not compared. "
+        "Acknowledge alone does not do it."},
 
     CodeText{Code::zero_missing, "zero_missing", "No zero measurement exists for this job.",
              "Put the object into its ideal position and make the zero measurement."},
     CodeText{Code::zero_outdated, "zero_outdated",
              "The zero measurement belongs to another calibration or another job file.",
              "Make a new zero measurement, or put the files back that it was made with."},
-    CodeText{Code::storage_failed, "storage_failed", "The zero measurement could not be stored.",
-             "Check the disk: is it full, read-only or broken? The reason names the file."},
+    CodeText{
+        Code::storage_failed, "storage_failed",
+        "The zero measurement could not be stored, or not be read again.",
+        "Check the disk: is it full, read-only or broken? The reason names the file. If that is damaged, "
+        "make a new zero measurement."},
     CodeText{Code::compensation_too_large, "compensation_too_large",
              "At the zero measurement a mark was found too far from where it should be.",
              "Look at this mark in the picture: is it really the mark? Then check its coordinates in the "

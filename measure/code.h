@@ -25,8 +25,10 @@ enum class Code : std::uint16_t {
   frame_damaged = 203,
   frame_wrong_size = 204,
   result_timeout = 205,
+  frame_frozen = 206,
   image_saturated = 211,
   image_dark = 212,
+  image_blurred = 213,
 
   too_few_marks = 301,
   too_few_marks_in_camera = 302,
@@ -46,6 +48,8 @@ enum class Code : std::uint16_t {
   limit_ry = 505,
   limit_rz = 506,
   value_out_of_range = 507,
+  limit_displacement = 508,
+  step_too_large = 509,
 
   zero_missing = 701,
   zero_outdated = 702,

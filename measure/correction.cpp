@@ -4,6 +4,12 @@
 
 namespace zeropose {
 
+Pose base_at(const LinearAxis& axis, const Pose& X_WR_taught, double position_mm) {
+  Pose X_WR = X_WR_taught;
+  X_WR.translation() += (position_mm - axis.zero_mm) * axis.direction_W;
+  return X_WR;
+}
+
 Pose correction(CorrectionFrame frame, const Pose& X_WR, const Pose& X_WO0, const Pose& X_WO) {
   const Pose D_W = X_WO * X_WO0.inverse();
   switch (frame) {

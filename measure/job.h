@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,7 +45,7 @@ struct Range {
   double min = 0, max = 0;
 };
 
-// What X_O0O and its estimate must fulfil (M6.2, M6.4, M6.5). Limits: x y z in mm, rx ry rz in degrees.
+// What X_O0O and its estimate must fulfil (M6.2, M6.4, M6.5, M6.6). Limits: x y z in mm, rx ry rz in degrees.
 struct Requirements {
   int min_marks = 3;
   int min_marks_per_camera = 0;  // in every camera of the job
@@ -52,6 +53,9 @@ struct Requirements {
   double max_sigma_mm = 0;   // at every application point, one sigma of the largest direction; 0: not checked
   double max_hidden_mm = 0;  // what one wrong mark may do at an application point unnoticed; 0: not checked
   double max_compensation_mm = 5;
+  double max_displacement_mm = 0;  // of every application point by X_O0O; 0: not checked
+  double max_step_mm = 0;          // of every application point since the last valid result; 0: not checked
+  double max_step_deg = 0;         // of the object's rotation since then; 0: not checked
   std::array<Range, 6> limits{};
 };
 
@@ -61,11 +65,16 @@ struct Job {
   std::vector<Mark> marks;
   std::vector<View> views;
   Pose X_WO_nominal =
-      Pose::Identity();        // where the object stops ideally, before a zero measurement says it better
-  double search_mm = 0;        // search areas reach this far round the expected place
-  double system_sigma_px = 0;  // calibration errors that remain after zero (M6.3)
+      Pose::Identity();  // where the object stops ideally, before a zero measurement says it better
+  std::optional<Pose> X_WP_planar{};  // a sheet: only x, y, rz in this plane of the world are free, O lies in
+                                      // it with its z axis across
+  double search_mm = 0;               // search areas reach this far round the expected place
+  double system_sigma_px = 0;         // calibration errors that remain after zero (M6.3)
   std::vector<ApplicationPoint> application_points;
   Requirements requirements;
 };
+
+// Fewer marks fix no pose, whatever the requirements say.
+inline int least_marks(const Job& job) { return job.X_WP_planar ? 2 : 3; }
 
 }  // namespace zeropose

@@ -2,11 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "calib/words.h"
 #include "measure/association.h"
 #include "measure/security.h"
+#include "measure/sharpness.h"
 
 namespace zeropose {
 namespace {
@@ -20,6 +22,8 @@ constexpr double thinnest_axis_ratio = 0.05;
 constexpr double smallest_diameter_px = 4;
 // Things in one window that the geometry is asked about; more are no question of geometry.
 constexpr std::size_t most_alike = 12;
+// How far the zero of a sheet may lie off its plane, mm and rad: rounding.
+constexpr double in_plane = 1e-6;
 
 MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double search_mm, const Pose& X_WO) {
   MarkSearch search;
@@ -55,17 +59,34 @@ const ImageView* image_of(std::span<const CameraImage> images, std::size_t camer
   return nullptr;
 }
 
+// O0 in the plane of a sheet as x, y and rz alone; what is left of the others is rounding.
+Pose flattened(const Pose& X_PO) {
+  const SixNumbers six = to_six_numbers(X_PO);
+  return from_six_numbers({six.x_mm, six.y_mm, 0, 0, 0, six.rz_deg});
+}
+
+bool lies_in(const Pose& X_WP, const Pose& X_WO) {
+  const Pose X_PO = X_WP.inverse() * X_WO;
+  return difference(flattened(X_PO), X_PO).norm() < in_plane;
+}
+
 Verdict check_zero(const Job& job, const Zero& zero) {
   if (zero.compensation_O_mm.empty())
     return {Code::zero_missing, "no zero measurement was made for job " + job.name};
   if (zero.compensation_O_mm.size() != job.marks.size())
     return {Code::zero_outdated, "the zero measurement knows " + number(zero.compensation_O_mm.size()) +
                                      " marks, job " + job.name + " has " + number(job.marks.size())};
-  const bool finite = zero.X_WO0.matrix().allFinite() &&
+  const Eigen::Matrix3d R = zero.X_WO0.linear();
+  const bool rotation =
+      (R.transpose() * R - Eigen::Matrix3d::Identity()).norm() < 1e-6 && R.determinant() > 0;
+  const bool finite = zero.X_WO0.matrix().allFinite() && rotation &&
                       std::all_of(zero.compensation_O_mm.begin(), zero.compensation_O_mm.end(),
                                   [](const auto& shift) { return shift.allFinite(); });
   if (!finite)
     return {Code::zero_outdated, "the zero measurement of job " + job.name + " holds numbers that are none"};
+  if (job.X_WP_planar && !lies_in(*job.X_WP_planar, zero.X_WO0))
+    return {Code::zero_outdated,
+            "the zero measurement of job " + job.name + " does not lie in the plane of the sheet"};
   return {Code::ok, {}};
 }
 
@@ -110,6 +131,55 @@ std::string misses_of(const Job& job, std::span<const MarkFinding> findings,
   return misses;
 }
 
+// What the finder says of marks that the picture spoils, and the code that the picture then gets (M6.1).
+struct Spoilt {
+  MarkStatus status;
+  Code code;
+};
+constexpr std::array spoilt_by{Spoilt{MarkStatus::blurred, Code::image_blurred},
+                               Spoilt{MarkStatus::saturated, Code::image_saturated}};
+
+// The findings, with blurred for what was not found in a window without a sharp edge: beyond some blur the
+// finder sees no mark that it could call so.
+std::vector<MarkFinding> with_blur(std::vector<MarkFinding> findings, std::span<const CameraImage> images,
+                                   const Job& job, std::span<const MarkSearch> searches) {
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    MarkFinding& finding = findings[i];
+    const ImageView* image = image_of(images, job.views[i].camera);
+    if (finding.status == MarkStatus::found || finding.status == MarkStatus::blurred || image == nullptr)
+      continue;
+    const auto blur_px = sharpest_edge_px(*image, window_of(*image, searches[i]));
+    if (!blur_px || !(*blur_px > searches[i].max_blur_px)) continue;
+    finding.status = MarkStatus::blurred;
+    finding.blur_px = *blur_px;
+    finding.u_px = searches[i].expected_px;
+  }
+  return findings;
+}
+
+// The verdict on the pictures where the requirements fail only because of marks that pictures spoil; else
+// nothing. Names the view that is spoilt most; of two reasons the one that spoils more views.
+std::optional<Verdict> spoilt_pictures(const Job& job, std::span<const CalibratedCamera> cameras,
+                                       std::span<const MarkFinding> findings,
+                                       std::span<const MarkSearch> searches) {
+  std::vector<View> views;
+  std::array<std::size_t, spoilt_by.size()> counts{}, worst{};
+  for (std::size_t i = 0; i < job.views.size(); ++i) {
+    if (findings[i].status == MarkStatus::found) views.push_back(job.views[i]);
+    for (std::size_t k = 0; k < spoilt_by.size(); ++k) {
+      if (findings[i].status != spoilt_by[k].status) continue;
+      views.push_back(job.views[i]);
+      if (counts[k]++ == 0 || findings[i].blur_px > findings[worst[k]].blur_px) worst[k] = i;
+    }
+  }
+  const auto most = static_cast<std::size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
+  if (counts[most] == 0 || check_marks(job, cameras, views).code != Code::ok) return std::nullopt;
+  const std::size_t i = worst[most];
+  return Verdict{spoilt_by[most].code, cameras[job.views[i].camera].name + ", mark " +
+                                           job.marks[job.views[i].mark].name + ": " +
+                                           reason_text(findings[i], searches[i])};
+}
+
 std::vector<View> effective_views(const Measurement& measurement) {
   std::vector<View> used;
   for (std::size_t i = 0; i < measurement.observations.size(); ++i)
@@ -132,6 +202,8 @@ bool find_all(Measurement& measurement, std::span<const CameraImage> images, con
   Verdict verdict = check_marks(job, cameras, found_views(job, measurement.findings));
   if (verdict.code != Code::ok) {
     const auto searches = job_searches(job, cameras, X_WO_expected);
+    const auto seen = with_blur(measurement.findings, images, job, searches);
+    if (auto spoilt = spoilt_pictures(job, cameras, seen, searches)) verdict = std::move(*spoilt);
     const std::string misses = misses_of(job, measurement.findings, searches);
     if (!misses.empty()) verdict.reason += " (" + misses + ")";
   }
@@ -145,6 +217,7 @@ bool estimate_all(Measurement& measurement, const Job& job, std::span<const Cali
   problem.marks = job.marks;
   problem.observations = measurement.observations;
   problem.X_WO_start = X_WO_start;
+  problem.X_WP_planar = job.X_WP_planar;
   problem.system_sigma_px = job.system_sigma_px;
   measurement.pose = estimate_pose(problem);
   for (const Deviation& deviation : measurement.pose.deviations)
@@ -156,6 +229,14 @@ bool estimate_all(Measurement& measurement, const Job& job, std::span<const Cali
   const Reliability reliability = reliability_of(job, problem, measurement.pose);
   measurement.hidden_mm = reliability.hidden_mm;
   return passes(measurement, check_power(job, problem, reliability));
+}
+
+// M6.5 and M6.6.
+void check_result(Measurement& measurement, const Job& job, const std::optional<Pose>& X_O0O_last) {
+  const Pose& X_O0O = measurement.X_O0O;
+  if (!passes(measurement, check_limits(job.requirements, X_O0O))) return;
+  if (!passes(measurement, check_displacement(job, X_O0O))) return;
+  if (X_O0O_last) passes(measurement, check_step(job, *X_O0O_last, X_O0O));
 }
 
 }  // namespace
@@ -209,7 +290,7 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
 }
 
 Measurement measure(const MeasurementProblem& problem) {
-  const auto& [images, job, cameras, zero] = problem;
+  const auto& [images, job, cameras, zero, X_O0O_last] = problem;
   Measurement measurement;
   if (!passes(measurement, check_zero(job, zero))) return measurement;
   if (!passes(measurement, check_images(images, job, cameras))) return measurement;
@@ -219,7 +300,8 @@ Measurement measure(const MeasurementProblem& problem) {
   measurement.sigma_mm = worst_sigma_mm(now, measurement.pose);
   if (!passes(measurement, check_sigma(now, measurement.pose))) return measurement;
   measurement.X_O0O = zero.X_WO0.inverse() * measurement.pose.X_WO;
-  passes(measurement, check_limits(now.requirements, measurement.X_O0O));
+  if (now.X_WP_planar) measurement.X_O0O = flattened(measurement.X_O0O);
+  check_result(measurement, now, X_O0O_last);
   return measurement;
 }
 

@@ -1,6 +1,7 @@
 // The whole staircase from images to a checked relative pose, pure: it replays anywhere (spec 50, 90).
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -24,7 +25,7 @@ struct Measurement {
   std::vector<MarkFinding> findings;      // one per view of the job
   std::vector<Observation> observations;  // the findings that were found
   PoseResult pose;
-  Pose X_O0O = Pose::Identity();    // meaningful only when code is ok
+  Pose X_O0O = Pose::Identity();    // meaningful only when code is ok; a sheet's has x, y and rz alone
   double largest_deviation_mm = 0;  // of the effective marks
   double sigma_mm = 0;              // at the worst application point
   double hidden_mm = 0;             // what one wrong mark could do at the worst application point unnoticed
@@ -48,11 +49,15 @@ struct MeasurementProblem {
   std::span<const CameraImage> images;
   const Job& job;
   std::span<const CalibratedCamera> cameras;
-  const Zero& zero;  // without compensations (default-made) it is missing
+  const Zero& zero;                  // without compensations (default-made) it is missing
+  std::optional<Pose> X_O0O_last{};  // the last valid result that a robot was sent, for the step limit (M6.6)
 };
 
 // Marks, pose, security and limits in the order of M6; the first check that fails names the code. Marks are
 // searched around the zero pose and used where the zero measurement's compensation puts them.
+//
+// image_blurred and image_saturated also where the job's requirements on marks fail only because the finder
+// calls marks blurred or saturated: with those they would be met.
 Measurement measure(const MeasurementProblem& problem);
 
 }  // namespace zeropose

@@ -96,6 +96,7 @@ Prediction predict(const PlanProblem& problem, std::span<const PlannedView> view
   estimate.marks = problem.job.marks;
   estimate.observations = prediction.observations;
   estimate.X_WO_start = problem.job.X_WO_nominal;
+  estimate.X_WP_planar = problem.job.X_WP_planar;
   estimate.system_sigma_px = problem.job.system_sigma_px;
   estimate.reject_wrong_marks = false;
   prediction.pose = estimate_pose(estimate);
@@ -137,7 +138,7 @@ std::vector<PlannedDirection> planned_directions(const PlanProblem& problem, con
   const SymmetricEigen eigen =
       symmetric_eigen(scaled * prediction.pose.total_covariance * scaled.transpose());
   std::vector<PlannedDirection> directions;
-  const int free = 6;
+  const int free = job.X_WP_planar ? 3 : 6;
   for (int i = 0; i < free; ++i) {
     const double sigma_mm = std::sqrt(std::max(0.0, eigen.values(5 - i)));
     const Vector6 motion = (sigma_mm * eigen.vectors.col(5 - i)).cwiseQuotient(scale);

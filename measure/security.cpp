@@ -14,6 +14,8 @@ namespace {
 constexpr int white_grey = 254, black_grey = 12;
 constexpr double max_white_share = 0.5;    // of the pixels
 constexpr double min_bright_share = 0.01;  // of the pixels, above black
+// What arithmetic leaves of a value that is its limit, mm and deg: far below the last digit of the wire.
+constexpr double rounding = 1e-9;
 
 Verdict good() { return {Code::ok, {}}; }
 
@@ -51,16 +53,27 @@ std::string missing_of(const Job& job, std::span<const CalibratedCamera> cameras
 
 struct Place {
   std::string name;
-  double sigma_mm = 0;
+  double value_mm = 0;
 };
 
-Place worst_place(const Job& job, const PoseResult& pose) {
+// Of the application points, or of the marks where there are none; NaN is worse than all.
+template <typename ValueAt>
+Place worst_place(const Job& job, const ValueAt& value_at) {
   Place worst;
   for (const ApplicationPoint& point : points_that_count(job)) {
-    const double sigma_mm = sigma_at_mm(pose, point.p_O_mm);
-    if (!(sigma_mm <= worst.sigma_mm)) worst = {point.name, sigma_mm};
+    const double value_mm = value_at(point.p_O_mm);
+    if (!(value_mm <= worst.value_mm) && !std::isnan(worst.value_mm)) worst = {point.name, value_mm};
   }
   return worst;
+}
+
+Place worst_sigma(const Job& job, const PoseResult& pose) {
+  return worst_place(job, [&pose](const Eigen::Vector3d& p_O_mm) { return sigma_at_mm(pose, p_O_mm); });
+}
+
+Place furthest(const Job& job, const Pose& X_O0O_from, const Pose& X_O0O_to) {
+  return worst_place(
+      job, [&](const Eigen::Vector3d& p_O_mm) { return (X_O0O_to * p_O_mm - X_O0O_from * p_O_mm).norm(); });
 }
 
 }  // namespace
@@ -92,7 +105,7 @@ Verdict check_image(const ImageView& image, const std::string& name) {
 Verdict check_marks(const Job& job, std::span<const CalibratedCamera> cameras, std::span<const View> used) {
   const Requirements& needed = job.requirements;
   const Counts counts = count_of(job, cameras.size(), used);
-  const int at_least = std::max(needed.min_marks, 3);
+  const int at_least = std::max(needed.min_marks, least_marks(job));
   if (counts.marks < at_least)
     return {Code::too_few_marks, number(counts.marks) + " marks can be used, " + number(at_least) +
                                      " are required; " + missing_of(job, cameras, used)};
@@ -122,14 +135,14 @@ double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
   return std::sqrt(symmetric_eigen(J * pose.total_covariance * J.transpose()).values.maxCoeff());
 }
 
-double worst_sigma_mm(const Job& job, const PoseResult& pose) { return worst_place(job, pose).sigma_mm; }
+double worst_sigma_mm(const Job& job, const PoseResult& pose) { return worst_sigma(job, pose).value_mm; }
 
 Verdict check_sigma(const Job& job, const PoseResult& pose) {
   const double limit = job.requirements.max_sigma_mm;
   if (limit == 0) return good();
-  const Place worst = worst_place(job, pose);
-  if (worst.sigma_mm <= limit) return good();
-  return {Code::sigma_too_large, "sigma at " + worst.name + " is " + number(worst.sigma_mm, 3) +
+  const Place worst = worst_sigma(job, pose);
+  if (worst.value_mm <= limit) return good();
+  return {Code::sigma_too_large, "sigma at " + worst.name + " is " + number(worst.value_mm, 3) +
                                      " mm, allowed are " + number(limit, 3) + " mm"};
 }
 
@@ -172,11 +185,37 @@ Verdict check_limits(const Requirements& requirements, const Pose& X_O0O) {
   for (std::size_t i = 0; i < axes.size(); ++i) {
     const Axis& axis = axes[i];
     const Range& range = requirements.limits[i];
-    if (axis.value >= range.min && axis.value <= range.max) continue;
+    const double slack = i < 3 ? 0 : rounding;
+    if (axis.value >= range.min - slack && axis.value <= range.max + slack) continue;
     return {axis.code, std::string(axis.name) + " is " + number(axis.value, 4) + axis.unit +
                            ", allowed are " + number(range.min, 4) + " to " + number(range.max, 4) +
                            axis.unit};
   }
+  return good();
+}
+
+Verdict check_displacement(const Job& job, const Pose& X_O0O) {
+  const double limit = job.requirements.max_displacement_mm;
+  if (limit == 0) return good();
+  const Place worst = furthest(job, Pose::Identity(), X_O0O);
+  if (worst.value_mm <= limit + rounding) return good();
+  return {Code::limit_displacement, worst.name + " is displaced by " + number(worst.value_mm, 3) +
+                                        " mm, allowed are " + number(limit, 3) + " mm"};
+}
+
+Verdict check_step(const Job& job, const Pose& X_O0O_last, const Pose& X_O0O) {
+  const Requirements& allowed = job.requirements;
+  const Place worst = furthest(job, X_O0O_last, X_O0O);
+  if (allowed.max_step_mm > 0 && !(worst.value_mm <= allowed.max_step_mm + rounding))
+    return {Code::step_too_large, worst.name + " is " + number(worst.value_mm, 3) +
+                                      " mm from where the last valid result put it, allowed are " +
+                                      number(allowed.max_step_mm, 3) + " mm"};
+  const double turn_deg =
+      log_so3(X_O0O_last.linear().transpose() * X_O0O.linear()).norm() * degrees_per_radian;
+  if (allowed.max_step_deg > 0 && !(turn_deg <= allowed.max_step_deg + rounding))
+    return {Code::step_too_large, "the object is turned by " + number(turn_deg, 4) +
+                                      " deg from where the last valid result put it, allowed are " +
+                                      number(allowed.max_step_deg, 4) + " deg"};
   return good();
 }
 

@@ -47,7 +47,16 @@ Reliability reliability_of(const Job& job, const PoseProblem& problem, const Pos
 // without being noticed. `problem` is what `reliability` was reckoned from.
 Verdict check_power(const Job& job, const PoseProblem& problem, const Reliability& reliability);
 
-// M6.5: each of x y z rx ry rz of X_O0O within its range, ends included.
+// M6.5: each of x y z rx ry rz of X_O0O within its range, ends included (those of angles to 1e-9 deg, for the
+// rounding of the rotation). For a sheet the same axes: those of O0.
 Verdict check_limits(const Requirements& requirements, const Pose& X_O0O);
+
+// M6.5: how far X_O0O carries each application point, |X_O0O p - p|; without application points each mark.
+// The limit itself passes (to 1e-9 mm).
+Verdict check_displacement(const Job& job, const Pose& X_O0O);
+
+// M6.6: how far each application point (without: each mark) has moved and how far the object has turned since
+// the last valid result. The limits themselves pass (to 1e-9).
+Verdict check_step(const Job& job, const Pose& X_O0O_last, const Pose& X_O0O);
 
 }  // namespace zeropose

@@ -94,6 +94,7 @@ PoseProblem problem_of(std::span<const CalibratedCamera> cameras, const Job& job
   problem.marks = job.marks;
   problem.observations = observations;
   problem.X_WO_start = X_WO_start;
+  problem.X_WP_planar = job.X_WP_planar;
   problem.system_sigma_px = job.system_sigma_px;
   problem.reject_wrong_marks = false;
   return problem;

@@ -63,6 +63,10 @@ TEST(Cell, ReadsTheOptionalKeys) {
   json["cameras"][0]["gain"] = 1.5;
   json["jobs"][0]["marks"][0]["tolerance_mm"] = 2;
   json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
+  json["jobs"][0]["requirements"]["max_displacement_mm"] = 45.5;
+  json["jobs"][0]["requirements"]["max_step_mm"] = 30;
+  json["jobs"][0]["requirements"]["max_step_deg"] = 0.25;
+  json["robots"][0]["axis"] = {{"direction", {0, 1.002, 0}}, {"zero_mm", -250.5}};
   json["robots"][0]["require_command_crc"] = false;
   json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
   json["robots"][0]["allowed_readers"] = {"10.0.0.2", "10.0.0.3"};
@@ -71,9 +75,46 @@ TEST(Cell, ReadsTheOptionalKeys) {
   EXPECT_EQ(cell.cameras[0].gain, 1.5);
   EXPECT_EQ(cell.jobs[0].marks[0].tolerance_mm, 2);
   EXPECT_EQ(cell.jobs[0].marks[0].sigma_mm, 0.1);
+  EXPECT_EQ(cell.jobs[0].requirements.max_displacement_mm, 45.5);
+  EXPECT_EQ(cell.jobs[0].requirements.max_step_mm, 30);
+  EXPECT_EQ(cell.jobs[0].requirements.max_step_deg, 0.25);
+  ASSERT_TRUE(cell.robots[0].axis);
+  EXPECT_EQ(cell.robots[0].axis->direction_W, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(cell.robots[0].axis->zero_mm, -250.5);
   EXPECT_FALSE(cell.robots[0].require_command_crc);
   EXPECT_THAT(cell.robots[0].allowed_writers, ElementsAre("10.0.0.1"));
   EXPECT_THAT(cell.robots[0].allowed_readers, ElementsAre("10.0.0.2", "10.0.0.3"));
+}
+
+TEST(Cell, WithoutTheOptionalKeysNothingMoreIsChecked) {
+  const Cell cell = load_cell(ZEROPOSE_SOURCE_DIR "/config/cells/car-body.json");
+  EXPECT_FALSE(cell.jobs[0].X_WP_planar);
+  EXPECT_EQ(cell.jobs[0].requirements.max_displacement_mm, 0);
+  EXPECT_EQ(cell.jobs[0].requirements.max_step_mm, 0);
+  EXPECT_EQ(cell.jobs[0].requirements.max_step_deg, 0);
+  EXPECT_FALSE(cell.robots[0].axis);
+}
+
+TEST(Cell, SheetNeedsTwoMarksAndLiesInItsPlane) {
+  Json json = example();
+  Json& job = json["jobs"][0];
+  job["nominal_pose"] = {100, 200, 300, 0, 0, 10};
+  job["planar"] = {0, 0, 300, 0, 0, -20};
+  while (job["marks"].size() > 2) job["marks"].erase(job["marks"].size() - 1);
+  job["requirements"]["min_marks"] = 2;
+  job["requirements"]["min_cameras"] = 1;
+  const Cell cell = parse_cell({json.dump(), "", example_calibration_text(), ""});
+  ASSERT_TRUE(cell.jobs[0].X_WP_planar);
+  EXPECT_NEAR(to_six_numbers(*cell.jobs[0].X_WP_planar).rz_deg, -20, 1e-12);
+  EXPECT_EQ(least_marks(cell.jobs[0]), 2);
+  job["marks"].erase(1);
+  EXPECT_THAT(
+      mistakes_in(json),
+      testing::Contains(HasSubstr("jobs[0].marks: found an array of 1, expected an array of at least 2")));
+  job.erase("planar");
+  EXPECT_THAT(
+      mistakes_in(json),
+      testing::Contains(HasSubstr("jobs[0].marks: found an array of 1, expected an array of at least 3")));
 }
 
 TEST(Cell, MarkSeenByTwoCamerasHasTwoViews) {
@@ -188,7 +229,30 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"/jobs/0/limits/y_mm", "[0, 0]",
                 "jobs[0].limits.y_mm: found [0, 0], expected an array [min, max] with min < max"},
         Mistake{"/jobs/0/requirements/min_marks", "2",
-                "jobs[0].requirements.min_marks: found 2, expected an integer from 3 to 10000"},
+                "jobs[0].requirements.min_marks: found 2, expected at least 3; 2 suffice in a job that is "
+                "planar"},
+        Mistake{"/jobs/0/requirements/min_marks", "1",
+                "jobs[0].requirements.min_marks: found 1, expected an integer from 2 to 10000"},
+        Mistake{"/jobs/0/requirements/max_displacement_mm", "-1",
+                "jobs[0].requirements.max_displacement_mm: found -1, expected a number from 0 to 10000"},
+        Mistake{"/jobs/0/requirements/max_step_mm", "\"far\"",
+                "jobs[0].requirements.max_step_mm: found \"far\", expected a number from 0 to 10000"},
+        Mistake{"/jobs/0/requirements/max_step_deg", "181",
+                "jobs[0].requirements.max_step_deg: found 181, expected a number from 0 to 180"},
+        Mistake{"/jobs/0/planar", "[0, 0, 0, 0, 0]",
+                "jobs[0].planar: found an array of 5, expected an array of 6 numbers"},
+        Mistake{"/jobs/0/planar", "[0, 0, 0.5, 0, 0, 30]",
+                "jobs[0].nominal_pose: found a pose -0.500000 mm above the plane, tilted by 0.000000 deg, "
+                "expected one that lies in the plane of planar (its z, rx and ry are 0 there)"},
+        Mistake{"/jobs/0/planar", "[0, 0, 0, 0.01, 0, 30]",
+                "jobs[0].nominal_pose: found a pose 0.000000 mm above the plane, tilted by 0.010000 deg, "
+                "expected one that lies in the plane of planar (its z, rx and ry are 0 there)"},
+        Mistake{"/robots/0/axis", "{\"direction\": [0.9, 0, 0], \"zero_mm\": 0}",
+                "robots[0].axis.direction: found a vector of length 0.900000, expected a unit vector (length "
+                "0.99 to 1.01)"},
+        Mistake{"/robots/0/axis", "{\"direction\": [1, 0, 0]}",
+                "robots[0].axis.zero_mm: found no such key, expected a number from -1000000 to 1000000"},
+        Mistake{"/robots/0/axis", "[1, 0, 0]", "robots[0].axis: found an array of 3, expected an object"},
         Mistake{
             "/jobs/0/requirements/min_marks", "13",
             "jobs[0].requirements.min_marks: found 13, expected at most the 12 marks with a weight above 0"},
@@ -215,6 +279,8 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{
                         "/jobs/0/marks/3/tolerence_px", "3",
                         "jobs[0].marks[3].tolerence_px: found an unknown key, expected \"tolerance_px\"?"},
+                    Mistake{"/robots/0/axis", R"({"direction": [1, 0, 0], "zero_mm": 0, "zero": 1})",
+                            "robots[0].axis.zero: found an unknown key, expected no key of this name"},
                     Mistake{"/camera", "[]", "camera: found an unknown key, expected \"cameras\"?"},
                     Mistake{"/hmi", "{}", "hmi: found an unknown key, expected no key of this name"}));
 

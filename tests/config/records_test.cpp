@@ -184,6 +184,65 @@ TEST(Records, WhatCannotBeReadBackIsNotSaved) {
   expect_same(load_zero(directory.path(), "body").value(), example(1));
 }
 
+// What becomes of the zero of example(7) in a cell (spec 85 R20).
+class ZeroForACell : public testing::Test {
+ protected:
+  ZeroForACell() {
+    job.name = "body";
+    job.marks.resize(12);
+    cell.config_hash = 0x0000beefU;
+    cell.calibration_hash = 0xfedcba98U;
+    save_zero(directory.path(), example(7));
+  }
+
+  void expect(Code code, const std::string& sentence) const {
+    const StoredZero stored = load_zero_for(directory.path(), cell, job);
+    EXPECT_EQ(stored.code, code) << stored.reason;
+    EXPECT_EQ(stored.record.has_value(), code == Code::ok);
+    EXPECT_THAT(stored.reason, HasSubstr(sentence));
+    EXPECT_EQ(stored.reason.empty(), code == Code::ok);
+  }
+
+  TemporaryDirectory directory;
+  Cell cell;
+  Job job;
+};
+
+TEST_F(ZeroForACell, IsUsedWithTheFilesItWasMadeWith) {
+  expect(Code::ok, "");
+  expect_same(load_zero_for(directory.path(), cell, job).record.value(), example(7));
+}
+
+TEST_F(ZeroForACell, IsMissingForAnotherJob) {
+  job.name = "door";
+  expect(Code::zero_missing, "no zero measurement was made for job door");
+}
+
+TEST_F(ZeroForACell, IsOutdatedByAnotherFile) {
+  cell.config_hash ^= 1;
+  expect(Code::zero_outdated, "job body of 2026-01-31T12:34:56Z was made with another cell file");
+  cell.calibration_hash ^= 1;
+  expect(Code::zero_outdated, "was made with another cell file and another calibration");
+  cell.config_hash ^= 1;
+  expect(Code::zero_outdated, "was made with another calibration");
+}
+
+TEST_F(ZeroForACell, IsOutdatedByAnotherNumberOfMarks) {
+  job.marks.pop_back();
+  expect(Code::zero_outdated, "was made with 12 marks, the job has 11");
+}
+
+TEST_F(ZeroForACell, ThatIsDamagedIsNotUsed) {
+  const std::filesystem::path path = zero_path(directory.path(), "body");
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  expect(Code::storage_failed, "the zero measurement of job body cannot be used: " + path.string());
+  std::filesystem::resize_file(path, 0);
+  expect(Code::storage_failed, "cannot be used: " + path.string());
+  std::filesystem::remove(path);
+  std::filesystem::create_directory(path);
+  expect(Code::storage_failed, "found a directory");
+}
+
 TEST(Records, TimeIsUtc) {
   EXPECT_EQ(iso8601_utc(std::chrono::system_clock::from_time_t(1769862896)), "2026-01-31T12:34:56Z");
 }

@@ -42,6 +42,11 @@ Json full_example() {
   json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
   json["jobs"][0]["marks"][0]["kind"] = "dark_ring";
   json["jobs"][0]["marks"][0]["inner_radius_mm"] = 1;
+  json["jobs"][0]["planar"] = {0, 0, 0, 0, 0, 0};
+  json["jobs"][0]["requirements"]["max_displacement_mm"] = 45;
+  json["jobs"][0]["requirements"]["max_step_mm"] = 30;
+  json["jobs"][0]["requirements"]["max_step_deg"] = 0.25;
+  json["robots"][0]["axis"] = {{"direction", {1, 0, 0}}, {"zero_mm", 0}};
   json["robots"][0]["require_command_crc"] = false;
   json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
   json["robots"][0]["allowed_readers"] = {"10.0.0.2"};

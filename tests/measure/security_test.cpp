@@ -182,6 +182,43 @@ TEST(Measurement, StopsAtTheFirstThingThatIsMissing) {
   EXPECT_EQ(code(images, some_zero()), Code::too_few_marks);
 }
 
+TEST(Measurement, RefusesAZeroThatIsNone) {
+  const CellScene scene = test::car_body();
+  const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+  const auto expect = [&](const Zero& zero, const char* sentence) {
+    const Measurement measurement = measure({{}, scene.job, scene.cameras, zero});
+    EXPECT_EQ(measurement.code, Code::zero_outdated);
+    EXPECT_NE(measurement.reason.find(sentence), std::string::npos) << measurement.reason;
+  };
+  std::vector<Zero> bad(5, some_zero());
+  bad[0].X_WO0.translation().z() = nan;
+  bad[1].X_WO0.linear()(0, 1) = inf;
+  bad[2].X_WO0.linear() *= 1.001;
+  bad[3].X_WO0.linear().col(0) *= -1;
+  bad[4].compensation_O_mm[11].y() = -inf;
+  for (const Zero& zero : bad) expect(zero, "holds numbers that are none");
+  Zero longer = some_zero();
+  longer.compensation_O_mm.emplace_back(0, 0, 0);
+  expect(longer, "knows 13 marks, job body has 12");
+}
+
+TEST(Measurement, RefusesViewsOfWhatDoesNotExist) {
+  const CellScene scene = test::car_body();
+  const Picture grey(100);
+  std::vector<CameraImage> images;
+  for (std::size_t camera = 0; camera < 5; ++camera) images.push_back({camera, grey.view});
+  for (const View& view : {View{4, 0}, View{0, 12}}) {
+    Job job = scene.job;
+    job.views.back() = view;
+    const Measurement measurement = measure({images, job, scene.cameras, some_zero()});
+    EXPECT_EQ(measurement.code, Code::marks_invalid) << measurement.reason;
+    EXPECT_NE(measurement.reason.find("does not exist"), std::string::npos);
+    EXPECT_TRUE(measurement.observations.empty());
+  }
+  // Pictures of cameras that no view asks for are nobody's business.
+  EXPECT_EQ(measure({images, scene.job, scene.cameras, some_zero()}).code, Code::too_few_marks);
+}
+
 TEST(Measurement, SearchesAroundTheProjectionOfEachDisc) {
   const CellScene scene = test::car_body();
   const auto searches = job_searches(scene.job, scene.cameras, Pose::Identity());
