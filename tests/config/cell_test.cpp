@@ -239,8 +239,9 @@ INSTANTIATE_TEST_SUITE_P(
                 "jobs[0].requirements.max_step_mm: found \"far\", expected a number from 0 to 10000"},
         Mistake{"/jobs/0/requirements/max_step_deg", "181",
                 "jobs[0].requirements.max_step_deg: found 181, expected a number from 0 to 180"},
-        Mistake{"/jobs/0/planar", "[0, 0, 0, 0, 0]",
-                "jobs[0].planar: found an array of 5, expected an array of 6 numbers"},
+        Mistake{
+            "/jobs/0/planar", "[0, 0, 0, 0, 0]",
+            "jobs[0].planar: found an array of 5, expected a pose [x, y, z, rx, ry, rz] in mm and degrees"},
         Mistake{"/jobs/0/planar", "[0, 0, 0.5, 0, 0, 30]",
                 "jobs[0].nominal_pose: found a pose -0.500000 mm above the plane, tilted by 0.000000 deg, "
                 "expected one that lies in the plane of planar (its z, rx and ry are 0 there)"},
