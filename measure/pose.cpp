@@ -61,18 +61,6 @@ Count count_active(const PoseModel& model, const PoseProblem& problem) {
   return count;
 }
 
-// Root mean square deviation.
-double rms_rad(const PoseModel& model) {
-  double sum = 0;
-  int count = 0;
-  for (std::size_t i = 0; i < model.size(); ++i) {
-    if (!model.active(i)) continue;
-    sum += model.dev_px(i).squaredNorm() / (model.camera(i).model.fx_px * model.camera(i).model.fx_px);
-    ++count;
-  }
-  return std::sqrt(sum / count);
-}
-
 bool same_place(const PoseModel& model, const CentredPose& a, const CentredPose& b) {
   return (a.p_WM_mm - b.p_WM_mm).norm() + model.extent_mm() * (a.R_WO - b.R_WO).norm() <
          1e-3 * model.extent_mm();
@@ -121,12 +109,12 @@ Found find_pose(PoseModel& model, const PoseProblem& problem) {
   if (problem.X_WO_start) {
     first = estimate(model, model.centred(*problem.X_WO_start));
     if (first.solution.status == SolverStatus::singular) return {std::move(first)};
-    const double rms = first.ok() ? rms_rad(model) : no_tolerance;
+    const double rms = first.ok() ? model.rms_rad() : no_tolerance;
     if (rms <= plausible_rms_rad) return {std::move(first)};
     if (problem.reject_wrong_marks && rms <= explicable_rms_rad) {
       Found found{first};
       found.rejection = reject_wrong_marks(model, found.estimate);
-      if (found.rejection->code == Code::ok) return found;
+      if (found.rejection->explained) return found;
     }
   }
   return estimate_from_anywhere(model, first);
@@ -193,8 +181,7 @@ Matrix6 about_origin(const PoseModel& model, const CentredPose& pose, const Matr
   return about_O;
 }
 
-void fill_result(const PoseModel& model, const PoseProblem& problem, const Found& found, PoseResult& result) {
-  const Count count = count_active(model, problem);
+void fill_result(const PoseModel& model, const Count& count, const Found& found, PoseResult& result) {
   const Estimate& estimate = found.estimate;
   result.effective_marks = count.marks;
   result.effective_cameras = count.cameras;
@@ -268,7 +255,7 @@ PoseResult estimate_pose(const PoseProblem& problem) {
     result.reason = std::move(rejection.reason);
     result.removed = std::move(rejection.removed);
   }
-  fill_result(model, problem, found, result);
+  fill_result(model, result.removed.empty() ? count : count_active(model, problem), found, result);
   return result;
 }
 

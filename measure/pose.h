@@ -74,8 +74,8 @@ struct PoseResult {
 // Wrong marks: an observation is wrong when its deviation is above the mark's tolerance, or above its own
 // standard deviation by more than chance allows (0.1 % per estimate). The smallest set of observations
 // without which all others agree is removed, if no other set of that size does nearly as well (likelihood
-// ratio below 1000) and if the rest still checks itself and is more than what was removed. Otherwise nobody
-// knows which one is wrong: deviation_not_attributable.
+// ratio below 1000) with another pose (four standard deviations away) and if the rest still checks itself and
+// is more than what was removed. Otherwise nobody knows which one is wrong: deviation_not_attributable.
 PoseResult estimate_pose(const PoseProblem& problem);
 
 }  // namespace zeropose

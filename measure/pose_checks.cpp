@@ -12,25 +12,31 @@
 namespace zeropose {
 namespace {
 
-bool is_number_above_zero(double value) { return std::isfinite(value) && value > 0; }
 bool is_number_not_below_zero(double value) { return std::isfinite(value) && value >= 0; }
+
+// Are all of them finite? So is their sum then; huge numbers whose sum is not are of no use either.
+template <typename... Numbers>
+bool finite(Numbers... numbers) {
+  return std::isfinite((numbers + ...));
+}
 
 bool valid(const CalibratedCamera& camera) {
   const CameraModel& model = camera.model;
-  return is_number_above_zero(model.fx_px) && is_number_above_zero(model.fy_px) &&
-         std::isfinite(model.cx_px) && std::isfinite(model.cy_px) && camera.X_WC.matrix().allFinite();
+  return model.fx_px > 0 && model.fy_px > 0 && camera.X_WC.matrix().allFinite() &&
+         finite(model.fx_px, model.fy_px, model.cx_px, model.cy_px);
 }
 
 bool valid(const Mark& mark) {
-  return mark.p_O_mm.allFinite() && mark.normal_O.allFinite() && is_number_not_below_zero(mark.radius_mm) &&
-         is_number_not_below_zero(mark.weight) && mark.weight <= 1 && mark.tolerance_px >= 0 &&
-         mark.tolerance_mm >= 0 && is_number_not_below_zero(mark.sigma_mm);
+  return finite(mark.p_O_mm.x(), mark.p_O_mm.y(), mark.p_O_mm.z(), mark.normal_O.x(), mark.normal_O.y(),
+                mark.normal_O.z(), mark.radius_mm, mark.weight, mark.sigma_mm) &&
+         mark.radius_mm >= 0 && mark.weight >= 0 && mark.weight <= 1 && mark.sigma_mm >= 0 &&
+         mark.tolerance_px >= 0 && mark.tolerance_mm >= 0;
 }
 
-bool valid(const Eigen::Matrix2d& covariance) {
-  return covariance.allFinite() && covariance(0, 0) > 0 && covariance(1, 1) > 0 &&
-         covariance(0, 0) * covariance(1, 1) - covariance(0, 1) * covariance(1, 0) > 0 &&
-         std::abs(covariance(0, 1) - covariance(1, 0)) <= 1e-9 * (covariance(0, 0) + covariance(1, 1));
+bool valid(const Eigen::Matrix2d& C) {
+  return finite(C(0, 0), C(0, 1), C(1, 0), C(1, 1)) && C(0, 0) > 0 && C(1, 1) > 0 &&
+         C(0, 0) * C(1, 1) - C(0, 1) * C(1, 0) > 0 &&
+         std::abs(C(0, 1) - C(1, 0)) <= 1e-9 * (C(0, 0) + C(1, 1));
 }
 
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
@@ -40,7 +46,7 @@ constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 const char* fault_of(const PoseProblem& problem, const Observation& observation, std::size_t& checked) {
   if (observation.camera >= problem.cameras.size()) return "names a camera that does not exist";
   if (observation.mark >= problem.marks.size()) return "names a mark that does not exist";
-  if (!observation.u_px.allFinite()) return "has a pixel that is not finite";
+  if (!finite(observation.u_px.x(), observation.u_px.y())) return "has a pixel that is not finite";
   if (!valid(observation.covariance_px2)) return "has a covariance that is not positive definite";
   if (!is_number_not_below_zero(observation.radius_share)) return "has a share of the radius that is none";
   if (observation.camera != checked && !valid(problem.cameras[observation.camera]))

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory>
 
 #include "measure/small_cholesky.h"
 
@@ -54,17 +55,19 @@ class SetSearch {
  public:
   SetSearch(const Rows& Y, const Eigen::VectorXd& r, std::size_t k, double highest)
       : n_(static_cast<std::size_t>(r.size()) / 2), width_(2 * n_), k_(k), highest_(highest) {
-    levels_.resize(std::max<std::size_t>(2, k) - 1);
-    for (Level& level : levels_) {
-      level.Q.resize(width_ * width_);
-      level.r.resize(width_);
+    if (k == 1) {
+      look_at_each(Y, r);
+      return;
     }
+    for (std::size_t level = 0; level + 1 < k; ++level)
+      levels_.push_back({std::make_unique_for_overwrite<double[]>(width_ * width_),
+                         std::make_unique_for_overwrite<double[]>(width_)});
     Level& all = levels_[0];
     for (std::size_t i = 0; i < width_; ++i) {
-      all.r[i] = r[static_cast<Eigen::Index>(i)];
-      for (std::size_t j = k == 1 ? i - i % 2 : 0; j <= i; ++j)
-        all.Q[j * width_ + i] =
-            (i == j ? 1 : 0) - Y.row(static_cast<Eigen::Index>(i)).dot(Y.row(static_cast<Eigen::Index>(j)));
+      const auto row = static_cast<Eigen::Index>(i);
+      all.r[i] = r[row];
+      for (std::size_t j = 0; j <= i; ++j)
+        all.Q[j * width_ + i] = (i == j ? 1 : 0) - Y.row(row).dot(Y.row(static_cast<Eigen::Index>(j)));
     }
     descend(0, 0, r.squaredNorm());
   }
@@ -77,7 +80,7 @@ class SetSearch {
 
  private:
   struct Level {
-    std::vector<double> Q, r;  // Q: upper triangle
+    std::unique_ptr<double[]> Q, r;  // Q: upper triangle
   };
 
   // Inverse of a block of two.
@@ -94,6 +97,17 @@ class SetSearch {
     double square(double a, double b) const { return i11 * a * a + 2 * i12 * a * b + i22 * b * b; }
   };
 
+  void look_at_each(const Rows& Y, const Eigen::VectorXd& r) {
+    const double misfit = r.squaredNorm();
+    for (std::size_t i = 0; i < n_; ++i) {
+      const auto row = static_cast<Eigen::Index>(2 * i);
+      const Inverse inverse(1 - Y.row(row).squaredNorm(), -Y.row(row).dot(Y.row(row + 1)),
+                            1 - Y.row(row + 1).squaredNorm());
+      set_ = std::uint64_t{1} << i;
+      if (inverse.ok) record(misfit - inverse.square(r[row], r[row + 1]));
+    }
+  }
+
   void record(double misfit) {
     if (misfit <= highest_) hits.push_back({misfit, set_});
   }
@@ -109,9 +123,7 @@ class SetSearch {
       const double r1 = level.r[2 * i], r2 = level.r[2 * i + 1];
       const double rest = misfit - inverse.square(r1, r2);
       set_ |= std::uint64_t{1} << i;
-      if (missing == 1)
-        record(rest);
-      else if (missing == 2)
+      if (missing == 2)
         last_of_pair(level, i, inverse, rest);
       else
         go_on(depth, i, inverse, rest);
@@ -181,15 +193,17 @@ LinearFit::LinearFit(const PoseModel& model) : basis_(basis_of(model)), extent_m
     g_ += equation.J.transpose() * equation.r;
   }
   fix_the_unused(basis_, N_);
+  const SmallCholesky<6> cholesky(N_);
+  determined_ = cholesky.ok();
+  if (!determined_) return;
+  fitted_ = r_ - J_ * cholesky.solve(g_);
+  Y_.resize(J_.rows(), 6);
+  for (Eigen::Index row = 0; row < J_.rows(); ++row) Y_.row(row) = cholesky.forward(J_.row(row).transpose());
 }
 
 std::vector<Deletion> LinearFit::sets(std::size_t k, double highest) const {
-  const SmallCholesky<6> cholesky(N_);
-  if (!cholesky.ok()) return {};
-  const Vector6 step = cholesky.solve(g_);
-  Rows Y(J_.rows(), 6);
-  for (Eigen::Index row = 0; row < J_.rows(); ++row) Y.row(row) = cholesky.forward(J_.row(row).transpose());
-  SetSearch search(Y, r_ - J_ * step, k, highest);
+  if (!determined_) return {};
+  SetSearch search(Y_, fitted_, k, highest);
   std::stable_sort(search.hits.begin(), search.hits.end(),
                    [](const auto& a, const auto& b) { return a.misfit < b.misfit; });
   std::vector<Deletion> deletions;

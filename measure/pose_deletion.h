@@ -38,8 +38,10 @@ class LinearFit {
  private:
   std::vector<std::size_t> observations_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> J_;  // two rows for each
-  Eigen::VectorXd r_;                                            // before the fit
-  Matrix6 basis_;                                                // of the unknowns
+  Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> Y_;  // J L^-T with L L' = N: N^-1's half
+  Eigen::VectorXd r_, fitted_;                                   // before and after the fit
+  bool determined_ = false;
+  Matrix6 basis_;  // of the unknowns
   Matrix6 N_ = Matrix6::Zero();
   Vector6 g_ = Vector6::Zero();
   double extent_mm_ = 1, doubt_ = 0;

@@ -22,8 +22,8 @@ CentredPose moved(const CentredPose& pose, const Vector6& delta) {
 
 namespace {
 
-// The lens' part of the eccentricity is below 0.01 px and changes by its share of a move over the distance.
-constexpr double bend_move_mm = 0.5;
+// The lens' part of the eccentricity changes by about 1e-5 px per mm.
+constexpr double bend_move_mm = 0.02;
 
 // W with W' W = C^-1, upper triangle.
 Vector3d whitening_of(const Matrix2d& C) {
@@ -122,9 +122,11 @@ struct Sums {
     const Lanes r1 = block.active * block.Wr[0], r2 = block.active * block.Wr[1];
     cost += r1 * r1 + r2 * r2;
     std::size_t at = 0;
+#pragma GCC unroll 6
     for (std::size_t i = 0; i < 6; ++i) {
       const Lanes a1 = block.active * block.row1[i], a2 = block.active * block.row2[i];
       g[i] += a1 * r1 + a2 * r2;
+#pragma GCC unroll 6
       for (std::size_t j = 0; j <= i; ++j) N[at++] += a1 * block.row1[j] + a2 * block.row2[j];
     }
   }
@@ -153,7 +155,8 @@ void put(std::size_t lane, const Vector2d& v, Lanes2& lanes) {
 
 PoseModel::PoseModel(const PoseProblem& problem)
     : problem_(problem),
-      blocks_((problem.observations.size() + lane_count - 1) / lane_count),
+      block_count_((problem.observations.size() + lane_count - 1) / lane_count),
+      blocks_(std::make_unique_for_overwrite<SightBlock[]>(block_count_)),
       algebraic_(problem.residual == Residual::algebraic),
       planar_(problem.X_WP_planar.has_value()),
       plain_(!algebraic_ && problem.system_sigma_px == 0),
@@ -165,10 +168,10 @@ PoseModel::PoseModel(const PoseProblem& problem)
   }
   for (std::size_t i = 0; i < size(); ++i) fill(i, observation(i));
   // What is left of the last block is a shadow of the last observation, without weight.
-  for (std::size_t i = size(); i < lane_count * blocks_.size(); ++i) {
+  for (std::size_t i = size(); i < lane_count * block_count_; ++i) {
     fill(i, problem.observations.back());
     set_active(i, false);
-    for (Lanes& w : blocks_.back().whitening) w[static_cast<Eigen::Index>(lane(i))] = 0;
+    for (Lanes& w : blocks_[block_count_ - 1].whitening) w[static_cast<Eigen::Index>(lane(i))] = 0;
   }
   centre();
 }
@@ -213,7 +216,7 @@ void PoseModel::centre() {
     centroid_O_mm_ += mark(i).p_O_mm;
   }
   if (count > 0) centroid_O_mm_ /= count;
-  for (std::size_t i = 0; i < lane_count * blocks_.size(); ++i) {
+  for (std::size_t i = 0; i < lane_count * block_count_; ++i) {
     const Vector3d p_MQ = p_MQ_mm(std::min(i, size() - 1));
     put(lane(i), p_MQ, blocks_[i / lane_count].p_MQ_mm);
     if (active(i)) squares += p_MQ.squaredNorm();
@@ -223,7 +226,7 @@ void PoseModel::centre() {
 
 int PoseModel::active_count() const {
   double count = 0;
-  for (const SightBlock& block : blocks_) count += block.active.sum();
+  for (const SightBlock& block : blocks()) count += block.active.sum();
   return static_cast<int>(count);
 }
 
@@ -321,7 +324,7 @@ void PoseModel::linearise_lane(const Lanes3& p, const Lanes3& n, std::size_t i, 
 bool PoseModel::linearise(const CentredPose& pose, NormalEquations& equations) {
   Sums sums;
   bool visible = true;
-  for (std::size_t at = 0; at < blocks_.size(); ++at) {
+  for (std::size_t at = 0; at < block_count_; ++at) {
     SightBlock& b = blocks_[at];
     Lanes3 q = turned(pose.R_WO, b.p_MQ_mm), normal_C, p_C;
     p_C = turned(b.R_CW, {q[0] + pose.p_WM_mm.x(), q[1] + pose.p_WM_mm.y(), q[2] + pose.p_WM_mm.z()});
@@ -348,69 +351,6 @@ bool PoseModel::linearise(const CentredPose& pose, NormalEquations& equations) {
   }
   sums.store(equations);
   return visible && std::isfinite(equations.cost);
-}
-
-Vector2d PoseModel::dev_mm(std::size_t i) const {
-  const CameraModel& model = camera(i).model;
-  const double depth_mm = block(i).depth_mm[static_cast<Eigen::Index>(lane(i))];
-  return dev_px(i).cwiseQuotient(Vector2d(model.fx_px, model.fy_px)) * depth_mm;
-}
-
-Eigen::Matrix<double, 2, 6> PoseModel::WJ(std::size_t i) const {
-  Eigen::Matrix<double, 2, 6> WJ;
-  for (std::size_t k = 0; k < 6; ++k) {
-    WJ(0, static_cast<Eigen::Index>(k)) = block(i).row1[k][static_cast<Eigen::Index>(lane(i))];
-    WJ(1, static_cast<Eigen::Index>(k)) = block(i).row2[k][static_cast<Eigen::Index>(lane(i))];
-  }
-  return WJ;
-}
-
-// Of an algebraic residual: the ray's derivative by the pixel is the inverse of the pixel's by the ray.
-Matrix2d PoseModel::own_covariance_mm2(std::size_t i) const {
-  const CameraModel& model = camera(i).model;
-  const double depth_mm = block(i).depth_mm[static_cast<Eigen::Index>(lane(i))];
-  const auto direction = ray(model, observation(i).u_px);
-  const auto projection = direction ? project_with_jacobian(model, *direction) : std::nullopt;
-  if (!projection) return observation(i).covariance_px2;
-  const Matrix2d mm_per_px = depth_mm * projection->du_dp.leftCols<2>().inverse();
-  return mm_per_px * observation(i).covariance_px2 * mm_per_px.transpose();
-}
-
-void PoseModel::refresh_covariances() {
-  for (std::size_t at = 0; at < blocks_.size(); ++at) {
-    SightBlock& b = blocks_[at];
-    const Lanes weight2 = b.weight * b.weight;
-    b.own = {weight2, Lanes::Zero(), weight2};
-    Lanes2 system{Lanes::Constant(system_variance_px2_), Lanes::Constant(system_variance_px2_)};
-    Lanes variance_mm2 = Lanes::Zero();
-    for (std::size_t k = 0; k < lane_count; ++k) {
-      const std::size_t i = std::min(lane_count * at + k, size() - 1);
-      const auto index = static_cast<Eigen::Index>(k);
-      variance_mm2[index] = mark(i).sigma_mm * mark(i).sigma_mm;
-      if (!algebraic_) continue;
-      const Matrix2d own = weight2[index] * own_covariance_mm2(i);
-      put(k, Vector3d(own(0, 0), own(0, 1), own(1, 1)), b.own);
-      for (std::size_t axis = 0; axis < 2; ++axis)
-        system[axis][index] *= std::pow(b.depth_mm[index] / b.focal_px[axis][index], 2);
-    }
-    const Lanes3& W = b.whitening;
-    b.total = {b.own[0] + W[0] * W[0] * system[0] + W[1] * W[1] * system[1],
-               b.own[1] + W[1] * W[2] * system[1], b.own[2] + W[2] * W[2] * system[1]};
-    for (std::size_t k = 0; k < 3; ++k) {
-      b.total[0] += variance_mm2 * b.row1[k] * b.row1[k];
-      b.total[1] += variance_mm2 * b.row1[k] * b.row2[k];
-      b.total[2] += variance_mm2 * b.row2[k] * b.row2[k];
-    }
-  }
-}
-
-Matrix2d PoseModel::total_covariance(std::size_t i) const {
-  if (plain_) return Matrix2d::Identity();
-  const auto k = static_cast<Eigen::Index>(lane(i));
-  const Lanes3& total = block(i).total;
-  Matrix2d C;
-  C << total[0][k], total[1][k], total[1][k], total[2][k];
-  return C;
 }
 
 }  // namespace zeropose

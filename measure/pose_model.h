@@ -5,7 +5,8 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
-#include <vector>
+#include <memory>
+#include <span>
 
 #include "measure/pose.h"
 
@@ -96,6 +97,7 @@ class PoseModel {
   // At the last linearisation.
   bool visible(std::size_t i) const { return block(i).visible[lane(i)]; }
   Eigen::Vector2d dev_px(std::size_t i) const { return pick(i, block(i).dev_px); }
+  double rms_rad() const;                       // of the active observations
   Eigen::Vector2d dev_mm(std::size_t i) const;  // at the mark's distance
   Eigen::Vector2d Wr(std::size_t i) const { return pick(i, block(i).Wr); }
   Eigen::Matrix<double, 2, 6> WJ(std::size_t i) const;
@@ -108,8 +110,8 @@ class PoseModel {
   Eigen::Matrix2d total_covariance(std::size_t i) const;
 
   double normalised(std::size_t i) const { return block(i).normalised[lane(i)]; }
-  std::vector<SightBlock>& blocks() { return blocks_; }
-  const std::vector<SightBlock>& blocks() const { return blocks_; }
+  std::span<SightBlock> blocks() { return {blocks_.get(), block_count_}; }
+  std::span<const SightBlock> blocks() const { return {blocks_.get(), block_count_}; }
 
  private:
   static std::size_t lane(std::size_t i) { return i % lane_count; }
@@ -124,7 +126,8 @@ class PoseModel {
   Eigen::Matrix2d own_covariance_mm2(std::size_t i) const;
 
   const PoseProblem& problem_;
-  std::vector<SightBlock> blocks_;
+  std::size_t block_count_;
+  std::unique_ptr<SightBlock[]> blocks_;
   bool algebraic_, planar_, plain_, has_discs_ = false, one_lens_ = true;
   double system_variance_px2_;
   Pose X_WP_ = Pose::Identity();

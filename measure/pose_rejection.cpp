@@ -6,6 +6,7 @@
 
 #include "calib/words.h"
 #include "measure/pose_deletion.h"
+#include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
@@ -14,6 +15,8 @@ using Set = std::vector<std::size_t>;
 
 // Chance that good observations alone raise the alarm, per estimate.
 constexpr double false_alarm = 0.001;
+// Explanations whose poses differ by no more than four standard deviations need not be told apart.
+constexpr double same_pose2 = 16;
 // More sets of equal size than this are not looked at one by one, and of these not more than that many are
 // estimated.
 constexpr double max_sets = 5000;
@@ -56,26 +59,41 @@ struct Explanation {
   Estimate estimate;
 };
 
+// Square of the difference of two poses by the covariance of the first.
+double distance2(const PoseModel& model, const Estimate& estimate, const CentredPose& other) {
+  const CentredPose& pose = estimate.solution.pose;
+  Vector6 apart;
+  apart << other.p_WM_mm - pose.p_WM_mm, model.extent_mm() * log_so3(other.R_WO * pose.R_WO.transpose());
+  const Matrix6& C = estimate.precision.total_covariance;
+  if (model.planar()) {
+    const auto& basis = model.planar_basis();
+    const SmallCholesky<3> cholesky(basis.transpose() * C * basis);
+    return cholesky.ok() ? cholesky.forward(basis.transpose() * apart).squaredNorm() : no_tolerance;
+  }
+  const SmallCholesky<6> cholesky(C);
+  return cholesky.ok() ? cholesky.forward(apart).squaredNorm() : no_tolerance;
+}
+
 // What the sets of one size explain.
 struct Explanations {
-  std::optional<Explanation> best;
-  double second_misfit = no_tolerance;
-  std::size_t count = 0;
+  std::vector<Explanation> all;
+  std::size_t best = 0;
   bool complete = true;         // all sets that could have been as good were looked at
   bool model_is_there = false;  // the model is linearised at the best
 
+  double misfit() const { return all[best].estimate.misfit; }
   void add(Explanation explanation) {
-    ++count;
-    const double misfit = explanation.estimate.misfit;
-    model_is_there = !best || misfit < best->estimate.misfit;
-    if (model_is_there) {
-      if (best) second_misfit = best->estimate.misfit;
-      best = std::move(explanation);
-    } else {
-      second_misfit = std::min(second_misfit, misfit);
-    }
+    model_is_there = all.empty() || explanation.estimate.misfit < misfit();
+    if (model_is_there) best = all.size();
+    all.push_back(std::move(explanation));
   }
-  bool is_clear() const { return complete && second_misfit - best->estimate.misfit >= equal_misfit; }
+  // Is the best one better than all others, or are they the same pose?
+  bool is_clear(const PoseModel& model) const {
+    return complete && std::all_of(all.begin(), all.end(), [&](const Explanation& other) {
+             return &other == &all[best] || other.estimate.misfit - misfit() >= equal_misfit ||
+                    distance2(model, all[best].estimate, other.estimate.solution.pose) <= same_pose2;
+           });
+  }
 };
 
 class Search {
@@ -104,8 +122,8 @@ class Search {
     const double limit = std::sqrt(agreeing_misfit(k)) + fit_->doubt();
     std::size_t estimates = 0;
     for (const Deletion& deletion : fit_->sets(k, limit * limit)) {
-      if (found.best) {
-        const double as_good = std::sqrt(found.best->estimate.misfit + equal_misfit) + fit_->doubt();
+      if (!found.all.empty()) {
+        const double as_good = std::sqrt(found.misfit() + equal_misfit) + fit_->doubt();
         if (deletion.misfit > as_good * as_good) break;
       }
       if (++estimates > max_estimates) {
@@ -210,27 +228,27 @@ std::string accusation(const PoseModel& model, std::size_t i) {
   return "mark " + model.mark(i).name + " deviates by " + number(model.dev_px(i).norm()) + " px";
 }
 
-Rejection refused(PoseModel& model, Estimate& current, std::string reason) {
+Rejection refused(PoseModel& model, Estimate& current, bool explained, std::string reason) {
   current = estimate(model, current.solution.pose);
-  return {Code::deviation_not_attributable, std::move(reason), {}};
+  return {Code::deviation_not_attributable, std::move(reason), {}, explained};
 }
 
 Rejection accepted(PoseModel& model, const Explanations& found, Estimate& current) {
-  const Explanation& best = *found.best;
+  const Explanation& best = found.all[found.best];
   set_active(model, best.removed, false);
   current = found.model_is_there ? best.estimate : estimate(model, best.estimate.solution.pose);
-  Rejection rejection{Code::ok, {}, best.removed};
+  Rejection rejection{Code::ok, {}, best.removed, true};
   std::stable_sort(rejection.removed.begin(), rejection.removed.end(),
                    [&model](auto a, auto b) { return model.normalised(a) > model.normalised(b); });
   return rejection;
 }
 
 std::string unclear(const Explanations& found) {
-  const std::string wrong = number(found.best->removed.size());
+  const std::string wrong = number(found.all[found.best].removed.size());
   if (!found.complete)
     return ", but more than " + number(max_estimates) + " choices of " + wrong +
            " wrong marks may explain it";
-  return ", but " + number(found.count) + " different choices of " + wrong +
+  return ", but " + number(found.all.size()) + " different choices of " + wrong +
          " wrong marks explain it and the best two equally well";
 }
 
@@ -247,7 +265,7 @@ Estimate estimate(PoseModel& model, const CentredPose& start) {
 
 Rejection reject_wrong_marks(PoseModel& model, Estimate& current) {
   const auto suspect = worst(model);
-  if (!suspect) return {Code::ok, {}, {}};
+  if (!suspect) return {Code::ok, {}, {}, true};
   const std::string accused = accusation(model, *suspect);
   Search search(model, current);
   const std::size_t largest = search.largest_set();
@@ -255,11 +273,11 @@ Rejection reject_wrong_marks(PoseModel& model, Estimate& current) {
   for (std::size_t k = 1; k <= largest; ++k) {
     const bool all = search.can_try_all(k);
     const Explanations found = all ? search.explanations(k) : search.greedy(largest);
-    if (found.best && found.is_clear()) return accepted(model, found, current);
-    if (found.best) return refused(model, current, accused + unclear(found));
+    if (!found.all.empty() && found.is_clear(model)) return accepted(model, found, current);
+    if (!found.all.empty()) return refused(model, current, true, accused + unclear(found));
     if (!all) break;
   }
-  return refused(model, current,
+  return refused(model, current, false,
                  accused + ", and with " + number(count) + " observations no removal of up to " +
                      number(largest) + " of them makes the others agree");
 }

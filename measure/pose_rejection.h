@@ -28,6 +28,7 @@ struct Rejection {
   Code code = Code::internal;
   std::string reason;
   std::vector<std::size_t> removed;  // observations, worst first
+  bool explained = false;            // without some all others agree, even if it is not clear without which
 };
 
 // Precondition: `current` is ok() and the model is linearised there. Observations that are removed are

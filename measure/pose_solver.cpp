@@ -12,6 +12,8 @@ namespace {
 // A step below this (mm at the extent of the marks) is the last one, if the step after it, as the last two
 // predict it, is below the second: what was linearised before it still holds.
 constexpr double last_step_mm = 1e-4, next_step_mm = 1e-7;
+// What the lens adds to the outlines of discs is computed near the solution only.
+constexpr double bend_step_mm = 2;
 constexpr int max_rounds = 100;
 
 // Solves (N + damping diag N) delta = g in the free directions. False when singular.
@@ -53,7 +55,7 @@ class Descent {
         solution_.pose = next;
         return SolverStatus::converged;
       }
-      if (take(next)) {
+      if (take(next, step_mm)) {
         previous_step_mm_ = step_mm;
         damping_ = damping_ < 1e-3 ? 0 : damping_ / 10;
       } else if (!damp()) {
@@ -73,8 +75,8 @@ class Descent {
   // Goes there if the cost gets lower. Where the lens' part of the outlines had to be computed anew, costs
   // with the old and the new one are not compared: the equations here are made anew and the step is tried
   // again.
-  bool take(const CentredPose& next) {
-    const bool other_bends = model_.bends_are_old(next);
+  bool take(const CentredPose& next, double step_mm) {
+    const bool other_bends = step_mm < bend_step_mm && model_.bends_are_old(next);
     if (other_bends) model_.refresh_bends(next);
     NormalEquations equations;
     const double old_cost = solution_.equations.cost;

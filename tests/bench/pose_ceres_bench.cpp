@@ -5,6 +5,7 @@
 #include <ceres/tiny_solver.h>
 
 #include <cmath>
+#include <deque>
 
 #include "tests/bench/pose_cases.h"
 
@@ -125,7 +126,7 @@ class TinyResidual {
   }
 
  private:
-  std::vector<AnalyticResidual> parts_;
+  std::deque<AnalyticResidual> parts_;
 };
 
 Pose solve_with_tiny_solver(const PoseCases& all, const PoseCase& one) {

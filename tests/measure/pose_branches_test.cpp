@@ -71,13 +71,17 @@ TEST(PoseBranches, OfThreeMarksInOneCameraAreAllReported) {
     const PoseResult result = mono.estimate();
     answered += has_truth(result, mono.X_WO);
     most = std::max(most, static_cast<int>(result.alternatives.size()));
-    if (result.code == Code::ok) EXPECT_TRUE(result.alternatives.empty());
+    if (result.code == Code::ok) {
+      EXPECT_TRUE(result.alternatives.empty());
+    }
     EXPECT_LE(result.alternatives.size(), 4u);  // Grunert's equation has no more roots
     for (std::size_t i = 0; i < result.alternatives.size(); ++i) {
       EXPECT_LT(mono.squares_px2(result.alternatives[i]), 1e-9);
       for (std::size_t k = 0; k < i; ++k) EXPECT_FALSE(same(result.alternatives[i], result.alternatives[k]));
     }
-    if (!result.alternatives.empty()) EXPECT_EQ(result.code, Code::geometry_degenerate);
+    if (!result.alternatives.empty()) {
+      EXPECT_EQ(result.code, Code::geometry_degenerate);
+    }
   }
   EXPECT_GE(answered, trials * 99 / 100);  // three marks may be almost on a line, or seen along their plane
   EXPECT_EQ(most, 4);
