@@ -216,18 +216,29 @@ std::vector<Deletion> LinearFit::sets(std::size_t k, double highest) const {
   return deletions;
 }
 
-Vector6 LinearFit::step_without(const std::vector<std::size_t>& set) const {
-  Matrix6 N = N_;
-  Vector6 g = g_;
+LinearFit::Sums LinearFit::without(const std::vector<std::size_t>& set) const {
+  Sums sums{N_, g_, r_.squaredNorm()};
   for (std::size_t at = 0; at < observations_.size(); ++at) {
     if (!std::binary_search(set.begin(), set.end(), observations_[at])) continue;
     const auto row = static_cast<Eigen::Index>(2 * at);
-    N -= J_.middleRows<2>(row).transpose() * J_.middleRows<2>(row);
-    g -= J_.middleRows<2>(row).transpose() * r_.segment<2>(row);
+    sums.N -= J_.middleRows<2>(row).transpose() * J_.middleRows<2>(row);
+    sums.g -= J_.middleRows<2>(row).transpose() * r_.segment<2>(row);
+    sums.squares -= r_.segment<2>(row).squaredNorm();
   }
-  const SmallCholesky<6> cholesky(N);
+  return sums;
+}
+
+double LinearFit::misfit_without(const std::vector<std::size_t>& set) const {
+  const Sums sums = without(set);
+  const SmallCholesky<6> cholesky(sums.N);
+  return cholesky.ok() ? sums.squares - cholesky.forward(sums.g).squaredNorm() : no_tolerance;
+}
+
+Vector6 LinearFit::step_without(const std::vector<std::size_t>& set) const {
+  const Sums sums = without(set);
+  const SmallCholesky<6> cholesky(sums.N);
   if (!cholesky.ok()) return Vector6::Zero();
-  Vector6 step = basis_ * cholesky.solve(g);
+  Vector6 step = basis_ * cholesky.solve(sums.g);
   step.tail<3>() /= extent_mm_;
   return step;
 }

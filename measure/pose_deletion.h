@@ -28,6 +28,9 @@ class LinearFit {
   // pose is open are left out.
   std::vector<Deletion> sets(std::size_t k, double highest) const;
 
+  // What one set leaves; infinite where the pose is open without it.
+  double misfit_without(const std::vector<std::size_t>& set) const;
+
   // Where the fit goes without a set, as moved() takes it.
   Vector6 step_without(const std::vector<std::size_t>& set) const;
 
@@ -36,6 +39,13 @@ class LinearFit {
   double doubt() const { return doubt_; }
 
  private:
+  struct Sums {
+    Matrix6 N;
+    Vector6 g;
+    double squares;
+  };
+  Sums without(const std::vector<std::size_t>& set) const;
+
   std::vector<std::size_t> observations_;
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> J_;  // two rows for each
   Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor> Y_;  // J L^-T with L L' = N: N^-1's half

@@ -78,8 +78,9 @@ double distance2(const PoseModel& model, const Estimate& estimate, const Centred
 struct Explanations {
   std::vector<Explanation> all;
   std::size_t best = 0;
-  bool complete = true;         // all sets that could have been as good were looked at
-  bool model_is_there = false;  // the model is linearised at the best
+  std::vector<Explanation> rivals;  // larger sets that are one fault as well: all marks of one camera
+  bool complete = true;             // all sets that could have been as good were looked at
+  bool model_is_there = false;      // the model is linearised at the best
 
   double misfit() const { return all[best].estimate.misfit; }
   void add(Explanation explanation) {
@@ -89,9 +90,13 @@ struct Explanations {
   }
   // Is the best one better than all others, or are they the same pose?
   bool is_clear(const PoseModel& model) const {
-    return complete && std::all_of(all.begin(), all.end(), [&](const Explanation& other) {
+    const auto same_pose = [&](const Explanation& other) {
+      return distance2(model, all[best].estimate, other.estimate.solution.pose) <= same_pose2;
+    };
+    return complete && std::all_of(rivals.begin(), rivals.end(), same_pose) &&
+           std::all_of(all.begin(), all.end(), [&](const Explanation& other) {
              return &other == &all[best] || other.estimate.misfit - misfit() >= equal_misfit ||
-                    distance2(model, all[best].estimate, other.estimate.solution.pose) <= same_pose2;
+                    same_pose(other);
            });
   }
 };
@@ -132,7 +137,34 @@ class Search {
       }
       try_without(deletion.set, moved(all_.solution.pose, fit_->step_without(deletion.set)), found);
     }
+    if (!found.all.empty()) add_rivals(found);
     return found;
+  }
+
+  // The marks of a camera that was moved err together: one fault, however many they are. Without them the
+  // others must not agree on another pose.
+  void add_rivals(Explanations& found) {
+    const Set removed = found.all[found.best].removed;
+    Explanations cameras;
+    std::vector<bool> seen;
+    for (const std::size_t first : active_) {
+      const std::size_t camera = model_.observation(first).camera;
+      if (seen.size() <= camera) seen.resize(camera + 1);
+      if (seen[camera]) continue;
+      seen[camera] = true;
+      Set set;
+      for (const std::size_t i : active_)
+        if (model_.observation(i).camera == camera) set.push_back(i);
+      const int left = static_cast<int>(active_.size() - set.size());
+      if (set.size() <= removed.size() || 2 * left <= model_.unknowns() ||
+          std::includes(set.begin(), set.end(), removed.begin(), removed.end()))
+        continue;
+      const double limit = std::sqrt(agreeing_misfit(set.size())) + fit_->doubt();
+      if (!(fit_->misfit_without(set) <= limit * limit)) continue;
+      found.model_is_there = false;
+      try_without(set, moved(all_.solution.pose, fit_->step_without(set)), cameras);
+    }
+    found.rivals = std::move(cameras.all);
   }
 
   // Too many to try all: the worst one by one, then back with those that agree after all, and that set with
@@ -245,6 +277,8 @@ Rejection accepted(PoseModel& model, const Explanations& found, Estimate& curren
 
 std::string unclear(const Explanations& found) {
   const std::string wrong = number(found.all[found.best].removed.size());
+  if (found.all.size() == 1 && !found.rivals.empty())
+    return ", but whether " + wrong + " marks are wrong or all of one camera is not clear";
   if (!found.complete)
     return ", but more than " + number(max_estimates) + " choices of " + wrong +
            " wrong marks may explain it";
