@@ -186,6 +186,8 @@ Json pose_json(const PoseInput& input, const PoseResult& result) {
   // No number that could be taken for a pose unless it is one.
   json["X_WO"] = good ? Json(six_of(result.X_WO)) : Json();
   json["covariance"] = good ? covariance_json(result.covariance) : Json();
+  json["alternatives"] = Json::array();
+  for (const Pose& X_WO : result.alternatives) json["alternatives"].push_back(six_of(X_WO));
   json["deviations"] = Json::array();
   for (std::size_t i = 0; i < result.deviations.size(); ++i)
     json["deviations"].push_back(deviation_json(input, i, result.deviations[i]));

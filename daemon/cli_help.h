@@ -47,7 +47,8 @@ Exit status: 0 done, 1 the lens model cannot be converted, 2 wrong usage or unre
 
 inline constexpr const char* pose_help =
     R"(Marks that do not fit the others are removed and named; when the redundancy does not tell which one is wrong,
-there is no answer. suu svv suv is the covariance of the found pixel in px^2. Where it is not given it is that
+there is no answer. When several poses explain the marks equally well (three marks in one camera: up to four)
+there is none either, but the JSON lists them all as alternatives, best first. suu svv suv is the covariance of the found pixel in px^2. Where it is not given it is that
 of one pixel (1 1 0): without wrong marks the pose is the same, but its covariance and the test for wrong
 marks then speak of one pixel. The covariance of the pose is along and about the world's axes, about the
 object's origin.

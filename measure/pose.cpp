@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "calib/symmetric_eigen.h"
 #include "calib/words.h"
+#include "measure/pose_checks.h"
 #include "measure/pose_rejection.h"
 #include "measure/pose_solver.h"
 #include "measure/pose_start.h"
@@ -14,78 +16,49 @@ namespace {
 
 // A start whose estimate leaves larger deviations (rad, root mean square) ended in a wrong valley.
 constexpr double plausible_rms_rad = 0.005;
+// Wrong marks may leave as much as this.
+constexpr double explicable_rms_rad = 0.03;
 constexpr std::size_t max_starts = 6;
 
-bool is_number_above_zero(double value) { return std::isfinite(value) && value > 0; }
-bool is_number_not_below_zero(double value) { return std::isfinite(value) && value >= 0; }
+// Counts different numbers below a bound; up to 64 of them cost no memory.
+class Distinct {
+ public:
+  explicit Distinct(std::size_t bound) : large_(bound > 64 ? bound : 0) {}
 
-bool valid(const CalibratedCamera& camera) {
-  const CameraModel& model = camera.model;
-  return is_number_above_zero(model.fx_px) && is_number_above_zero(model.fy_px) &&
-         std::isfinite(model.cx_px) && std::isfinite(model.cy_px) && camera.X_WC.matrix().allFinite();
-}
+  void add(std::size_t number) {
+    if (!large_.empty()) {
+      count_ += !large_[number];
+      large_[number] = true;
+      return;
+    }
+    const std::uint64_t bit = std::uint64_t{1} << number;
+    count_ += (small_ & bit) == 0;
+    small_ |= bit;
+  }
+  int count() const { return count_; }
 
-bool valid(const Mark& mark) {
-  return mark.p_O_mm.allFinite() && mark.normal_O.allFinite() && is_number_not_below_zero(mark.radius_mm) &&
-         is_number_not_below_zero(mark.weight) && mark.weight <= 1 && mark.tolerance_px >= 0 &&
-         mark.tolerance_mm >= 0 && is_number_not_below_zero(mark.sigma_mm);
-}
-
-bool valid(const Eigen::Matrix2d& covariance) {
-  return covariance.allFinite() && covariance(0, 0) > 0 && covariance(1, 1) > 0 &&
-         covariance.determinant() > 0 &&
-         std::abs(covariance(0, 1) - covariance(1, 0)) <= 1e-9 * covariance.trace();
-}
-
-// What is wrong with an observation's numbers, or nothing.
-std::string fault_of(const PoseProblem& problem, const Observation& observation) {
-  if (observation.camera >= problem.cameras.size()) return "names a camera that does not exist";
-  if (observation.mark >= problem.marks.size()) return "names a mark that does not exist";
-  if (!observation.u_px.allFinite()) return "has a pixel that is not finite";
-  if (!valid(observation.covariance_px2)) return "has a covariance that is not positive definite";
-  if (!valid(problem.cameras[observation.camera]))
-    return "comes from a camera whose calibration is not usable";
-  if (!valid(problem.marks[observation.mark])) return "belongs to a mark whose numbers are not usable";
-  return {};
-}
-
-// What is wrong with the numbers of the problem, or nothing.
-std::string fault_of(const PoseProblem& problem) {
-  if (!is_number_not_below_zero(problem.system_sigma_px)) return "the system's sigma is not a number >= 0";
-  for (const auto* pose : {&problem.X_WO_start, &problem.X_WP_planar})
-    if (*pose && !(*pose)->matrix().allFinite()) return "a given pose is not finite";
-  for (std::size_t i = 0; i < problem.observations.size(); ++i)
-    if (const std::string fault = fault_of(problem, problem.observations[i]); !fault.empty())
-      return "observation " + number(i + 1) + " (from 1) " + fault;
-  return {};
-}
+ private:
+  std::uint64_t small_ = 0;
+  std::vector<bool> large_;
+  int count_ = 0;
+};
 
 struct Count {
   int marks = 0, cameras = 0, observations = 0;
 };
 
 Count count_active(const PoseModel& model, const PoseProblem& problem) {
-  std::vector<bool> marks(problem.marks.size()), cameras(problem.cameras.size());
+  Distinct marks(problem.marks.size()), cameras(problem.cameras.size());
   Count count;
-  for (const Sight& sight : model.sights()) {
-    if (!sight.active) continue;
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    if (!model.active(i)) continue;
     ++count.observations;
-    count.marks += !marks[sight.mark_index];
-    count.cameras += !cameras[sight.camera_index];
-    marks[sight.mark_index] = cameras[sight.camera_index] = true;
+    marks.add(model.observation(i).mark);
+    cameras.add(model.observation(i).camera);
   }
+  count.marks = marks.count();
+  count.cameras = cameras.count();
   return count;
-}
-
-bool plausible(const PoseModel& model) {
-  double sum = 0;
-  int count = 0;
-  for (const Sight& sight : model.sights()) {
-    if (!sight.active) continue;
-    sum += (sight.dev_px / sight.camera->fx_px).squaredNorm();
-    ++count;
-  }
-  return sum <= plausible_rms_rad * plausible_rms_rad * count;
 }
 
 bool same_place(const PoseModel& model, const CentredPose& a, const CentredPose& b) {
@@ -95,14 +68,15 @@ bool same_place(const PoseModel& model, const CentredPose& a, const CentredPose&
 
 struct Found {
   Estimate estimate;
-  int equally_good = 1;        // poses that explain the marks as well as this one
-  bool position_open = false;  // no start: the directions of sight are parallel
+  std::vector<CentredPose> branches{};   // when several poses explain the marks equally well: all, best first
+  bool position_open = false;            // no start: the directions of sight are parallel
+  std::optional<Rejection> rejection{};  // wrong marks were looked for already
 };
 
 // The best of several starts.
 Found estimate_from_anywhere(PoseModel& model, const Estimate& first) {
   const auto starts = start_poses(model, max_starts);
-  if (!starts) return {first, 1, first.solution.status == SolverStatus::failed};
+  if (!starts) return {first, {}, first.solution.status == SolverStatus::failed};
   std::vector<Estimate> estimates;
   if (first.ok()) estimates.push_back(first);
   Estimate failed = first;
@@ -117,22 +91,31 @@ Found estimate_from_anywhere(PoseModel& model, const Estimate& first) {
     });
     if (!known) estimates.push_back(std::move(next));
   }
-  if (estimates.empty()) return {failed, 1};
-  const auto best = std::min_element(estimates.begin(), estimates.end(), [](const auto& a, const auto& b) {
-    return a.solution.equations.cost < b.solution.equations.cost;
-  });
-  const auto equal = std::count_if(estimates.begin(), estimates.end(), [best](const Estimate& estimate) {
-    return std::abs(estimate.misfit - best->misfit) < equal_misfit;
-  });
-  return {estimate(model, best->solution.pose), static_cast<int>(equal)};
+  if (estimates.empty()) return {failed};
+  std::stable_sort(estimates.begin(), estimates.end(),
+                   [](const Estimate& a, const Estimate& b) { return a.misfit < b.misfit; });
+  Found found{estimate(model, estimates.front().solution.pose)};
+  for (const Estimate& estimate : estimates)
+    if (estimate.misfit - estimates.front().misfit < equal_misfit)
+      found.branches.push_back(estimate.solution.pose);
+  if (found.branches.size() == 1) found.branches.clear();
+  return found;
 }
 
-Found find_pose(PoseModel& model, const std::optional<Pose>& X_WO_start) {
+// From the start. Where that leaves large deviations it ended in a wrong valley, or marks are wrong: if
+// without some of them all others agree it was that.
+Found find_pose(PoseModel& model, const PoseProblem& problem) {
   Estimate first;
-  if (X_WO_start) {
-    first = estimate(model, model.centred(*X_WO_start));
-    if (first.solution.status == SolverStatus::singular || (first.ok() && plausible(model)))
-      return {std::move(first), 1};
+  if (problem.X_WO_start) {
+    first = estimate(model, model.centred(*problem.X_WO_start));
+    if (first.solution.status == SolverStatus::singular) return {std::move(first)};
+    const double rms = first.ok() ? model.rms_rad() : no_tolerance;
+    if (rms <= plausible_rms_rad) return {std::move(first)};
+    if (problem.reject_wrong_marks && rms <= explicable_rms_rad) {
+      Found found{first};
+      found.rejection = reject_wrong_marks(model, found.estimate);
+      if (found.rejection->explained) return found;
+    }
   }
   return estimate_from_anywhere(model, first);
 }
@@ -141,10 +124,10 @@ std::string words_of(const Eigen::Vector3d& v) {
   return std::string("(").append(number(v.x())) + " " + number(v.y()) + " " + number(v.z()) + ")";
 }
 
-std::string why_degenerate(const PoseModel& model, const Precision& precision) {
+std::string why_degenerate(const PoseModel& model, const Matrix6& N, const Precision& precision) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
-  for (const Sight& sight : model.sights())
-    if (sight.active) spread += sight.p_MQ_mm * sight.p_MQ_mm.transpose();
+  for (std::size_t i = 0; i < model.size(); ++i)
+    if (model.active(i)) spread += model.p_MQ_mm(i) * model.p_MQ_mm(i).transpose();
   const Eigen::Vector3d squares = symmetric_eigen(spread).values;
   const double count = std::max(1, model.active_count());
   const double along = std::sqrt(std::max(0.0, squares(2)) / count);
@@ -155,7 +138,8 @@ std::string why_degenerate(const PoseModel& model, const Precision& precision) {
   if (across <= 1e-2 * along)
     return "the marks lie on a line: " + number(across) + " mm across over " + number(along) +
            " mm along (root mean square), " + numbers;
-  const Eigen::Vector3d shift = precision.weakest.head<3>(), turn = precision.weakest.tail<3>();
+  const Vector6 weakest = weakest_direction(model, N);
+  const Eigen::Vector3d shift = weakest.head<3>(), turn = weakest.tail<3>();
   if (shift.norm() > turn.norm())
     return "the marks leave the position along " + words_of(shift.normalized()) +
            " of the world open: " + numbers;
@@ -163,51 +147,54 @@ std::string why_degenerate(const PoseModel& model, const Precision& precision) {
          " of the world open: " + numbers;
 }
 
-void fill_deviations(const PoseModel& model, const Estimate& estimate, PoseResult& result) {
-  for (std::size_t i = 0; i < model.sights().size(); ++i) {
-    const Sight& sight = model.sights()[i];
-    Deviation& deviation = result.deviations.emplace_back();
-    deviation.used = sight.active;
-    if (!sight.visible) {
+void fill_deviations(const PoseModel& model, PoseResult& result) {
+  result.deviations.resize(model.size());
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    Deviation& deviation = result.deviations[i];
+    deviation.used = model.active(i);
+    if (model.visible(i)) {
+      deviation.dev_px = model.dev_px(i);
+      deviation.dev_mm = model.dev_mm(i);
+    } else {
       deviation.dev_px.setConstant(no_tolerance);
       deviation.dev_mm.setConstant(no_tolerance);
-      deviation.normalised = no_tolerance;
-      continue;
     }
-    const Eigen::Vector2d focal_px(sight.camera->fx_px, sight.camera->fy_px);
-    deviation.dev_px = sight.dev_px;
-    deviation.dev_mm = sight.dev_px.cwiseQuotient(focal_px) * sight.depth_mm;
-    deviation.normalised = estimate.normalised[i];
+    deviation.normalised = model.normalised(i);
   }
   for (const std::size_t i : result.removed) result.deviations[i].removed = true;
 }
 
-// The covariance about M as one about O: dp_O = dp_M + [c]x dr with c from O to M, axes of W.
+// The covariance about M, rotations in mm at the extent, as one about O: dp_O = dp_M + [c]x dr with c from O
+// to M, axes of W.
 Matrix6 about_origin(const PoseModel& model, const CentredPose& pose, const Matrix6& covariance) {
   const Eigen::Matrix3d S = cross_matrix(pose.R_WO * model.centroid_O_mm());
-  const Eigen::Matrix3d turn = covariance.bottomRightCorner<3, 3>();
-  const Eigen::Matrix3d mixed = covariance.topRightCorner<3, 3>() + S * turn;
+  const double share = 1 / model.extent_mm();
+  const Eigen::Matrix3d turn = share * share * covariance.bottomRightCorner<3, 3>();
+  const Eigen::Matrix3d both = share * covariance.topRightCorner<3, 3>();
+  const Eigen::Matrix3d mixed = both + S * turn;
   Matrix6 about_O;
   about_O.topLeftCorner<3, 3>() =
-      covariance.topLeftCorner<3, 3>() + S * covariance.bottomLeftCorner<3, 3>() + mixed * S.transpose();
+      covariance.topLeftCorner<3, 3>() + S * both.transpose() + mixed * S.transpose();
   about_O.topRightCorner<3, 3>() = mixed;
   about_O.bottomLeftCorner<3, 3>() = mixed.transpose();
   about_O.bottomRightCorner<3, 3>() = turn;
   return about_O;
 }
 
-void fill_result(const PoseModel& model, const PoseProblem& problem, const Estimate& estimate,
-                 PoseResult& result) {
-  const Count count = count_active(model, problem);
+void fill_result(const PoseModel& model, const Count& count, const Found& found, PoseResult& result) {
+  const Estimate& estimate = found.estimate;
   result.effective_marks = count.marks;
   result.effective_cameras = count.cameras;
   result.redundancy = 2 * count.observations - model.unknowns();
   result.condition = estimate.precision.condition;
   if (estimate.solution.status != SolverStatus::converged) return;
-  result.X_WO = model.pose(estimate.solution.pose);
-  fill_deviations(model, estimate, result);
-  result.covariance = about_origin(model, estimate.solution.pose, estimate.precision.covariance);
-  result.total_covariance = about_origin(model, estimate.solution.pose, estimate.precision.total_covariance);
+  const CentredPose& pose = estimate.solution.pose;
+  result.X_WO = model.pose(pose);
+  for (const CentredPose& branch : found.branches) result.alternatives.push_back(model.pose(branch));
+  fill_deviations(model, result);
+  result.covariance = about_origin(model, pose, estimate.precision.covariance);
+  result.total_covariance =
+      model.plain() ? result.covariance : about_origin(model, pose, estimate.precision.total_covariance);
 }
 
 PoseResult failed(Code code, std::string reason) {
@@ -218,10 +205,10 @@ PoseResult failed(Code code, std::string reason) {
 }
 
 // Why an estimate cannot be used, or ok.
-Code fault_of(const PoseModel& model, const Found& found, std::string& reason) {
+Code fault_of(PoseModel& model, const Found& found, std::string& reason) {
   const Solution& solution = found.estimate.solution;
-  if (found.equally_good > 1) {
-    reason = number(found.equally_good) + " different poses explain the " + number(model.active_count()) +
+  if (!found.branches.empty()) {
+    reason = number(found.branches.size()) + " different poses explain the " + number(model.active_count()) +
              " observations equally well";
     return Code::geometry_degenerate;
   }
@@ -232,14 +219,14 @@ Code fault_of(const PoseModel& model, const Found& found, std::string& reason) {
   }
   if (solution.status == SolverStatus::converged) {
     if (found.estimate.precision.determined) return Code::ok;
-    reason = why_degenerate(model, found.estimate.precision);
+    reason = why_degenerate(model, solution.equations.N, found.estimate.precision);
     return Code::geometry_degenerate;
   }
   const bool tried =
       solution.status == SolverStatus::not_converged || solution.status == SolverStatus::singular;
   const Precision precision = tried ? precision_of(model, solution) : Precision{};
   if (tried && !precision.determined) {
-    reason = why_degenerate(model, precision);
+    reason = why_degenerate(model, solution.equations.N, precision);
     return Code::geometry_degenerate;
   }
   reason =
@@ -258,17 +245,17 @@ PoseResult estimate_pose(const PoseProblem& problem) {
   if (count.marks < needed)
     return failed(Code::too_few_marks,
                   number(count.marks) + " marks with a weight were found, a pose needs " + number(needed));
-  Found found = find_pose(model, problem.X_WO_start);
+  Found found = find_pose(model, problem);
   PoseResult result;
   result.code = fault_of(model, found, result.reason);
   if (result.code == Code::ok && problem.reject_wrong_marks) {
-    Rejection rejection = reject_wrong_marks(model, found.estimate);
+    Rejection rejection =
+        found.rejection ? std::move(*found.rejection) : reject_wrong_marks(model, found.estimate);
     result.code = rejection.code;
     result.reason = std::move(rejection.reason);
     result.removed = std::move(rejection.removed);
-    found.estimate = std::move(rejection.estimate);
   }
-  fill_result(model, problem, found.estimate, result);
+  fill_result(model, result.removed.empty() ? count : count_active(model, problem), found, result);
   return result;
 }
 

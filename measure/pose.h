@@ -57,22 +57,25 @@ struct PoseResult {
   int effective_cameras = 0;
   int redundancy = 0;    // equations minus unknowns
   double condition = 0;  // of the normal matrix scaled by the marks' extent, 1-norm
+  // When several poses explain the marks equally well (geometry_degenerate; three marks in one camera have up
+  // to four): all of them, each refined, best first; otherwise empty.
+  std::vector<Pose> alternatives{};
 };
 
 // Gauss-Newton with Levenberg's damping on the whitened residuals, weights as the user's: with W the weights
 // and J the whitened Jacobian, N = J' W^2 J and covariance = N^-1 (J' W^4 J) N^-1. Repeatable bit by bit.
 //
-// Codes: marks_invalid (an index out of range, a number that is none, a covariance that is not positive),
-// too_few_marks (fewer than 3 with weight, 2 if planar), geometry_degenerate (the marks leave a direction
-// open, or several poses explain them equally well), not_converged, deviation_not_attributable. Deviations
-// are filled in where there is an estimate, whatever the code; X_WO and the covariances count only when the
-// code is ok.
+// Codes: marks_invalid (an index out of range, a number that is none, a covariance that is not positive, a
+// mark twice in one camera: the two would vouch for each other), too_few_marks (fewer than 3 with weight, 2
+// if planar), geometry_degenerate (the marks leave a direction open, or several poses explain them equally
+// well), not_converged, deviation_not_attributable. Deviations are filled in where there is an estimate,
+// whatever the code; X_WO and the covariances count only when the code is ok.
 //
 // Wrong marks: an observation is wrong when its deviation is above the mark's tolerance, or above its own
 // standard deviation by more than chance allows (0.1 % per estimate). The smallest set of observations
 // without which all others agree is removed, if no other set of that size does nearly as well (likelihood
-// ratio below 1000) and if the rest still checks itself and is more than what was removed. Otherwise nobody
-// knows which one is wrong: deviation_not_attributable.
+// ratio below 1000) with another pose (four standard deviations away) and if the rest still checks itself and
+// is more than what was removed. Otherwise nobody knows which one is wrong: deviation_not_attributable.
 PoseResult estimate_pose(const PoseProblem& problem);
 
 }  // namespace zeropose

@@ -3,8 +3,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
-#include <vector>
+#include <memory>
+#include <span>
 
 #include "measure/pose.h"
 
@@ -21,50 +23,55 @@ struct CentredPose {
 CentredPose moved(const CentredPose& pose, const Vector6& delta);
 
 // N = sum J' P J, g = sum J' P r, cost = sum r' P r over the active observations, P the information matrices.
+// Here and in everything that is made of it the rotation is measured in mm at the extent of the marks.
 struct NormalEquations {
   Matrix6 N = Matrix6::Zero();
   Vector6 g = Vector6::Zero();
   double cost = 0;
 };
 
-// One observation: what is known, and its linearisation r(delta) = r - J delta with
-// J = [A, -A [q]x].
-struct Sight {
-  const CameraModel* camera = nullptr;
-  const Mark* mark = nullptr;
-  std::size_t camera_index = 0, mark_index = 0;
-  Eigen::Matrix3d R_CW;
-  Eigen::Vector3d p_WC_mm;
-  Eigen::Vector3d p_MQ_mm;  // the mark's centre, axes of O
-  Eigen::Vector2d u_px;
-  Eigen::Matrix2d covariance_px2;
-  Eigen::Matrix2d information;  // P
-  Eigen::Matrix2d whitening;    // W with W' W = P; for an observation of weight 0 as if its weight were 1
-  bool has_offset = false;      // radius and normal are known
-  bool active = false;          // takes part in the estimate
-  bool visible = false;         // has an image at the pose of the linearisation
+// Two observations side by side: vector instructions of every processor take them at once.
+inline constexpr std::size_t lane_count = 2;
+using Lanes = Eigen::Array<double, lane_count, 1>;
 
-  double radius_share = 1;                              // of the mark's radius: the circle that was measured
-  Eigen::Vector2d offset_px = Eigen::Vector2d::Zero();  // eccentricity of the mark's image
-  Eigen::Vector2d r = Eigen::Vector2d::Zero();          // px, or mm for algebraic residuals
-  Eigen::Matrix<double, 2, 3> A =
-      Eigen::Matrix<double, 2, 3>::Zero();           // derivative of the prediction by the mark's position
-  Eigen::Vector3d q = Eigen::Vector3d::Zero();       // R_WO * p_MQ
-  Eigen::Vector2d dev_px = Eigen::Vector2d::Zero();  // found - projected
-  double depth_mm = 0;
-  Eigen::Matrix<double, 6, 2> WJ = Eigen::Matrix<double, 6, 2>::Zero();  // (W J)'
-  Eigen::Vector2d Wr = Eigen::Vector2d::Zero();
+// What is known of lane_count observations, and their linearisation r(delta) = r - J delta, whitened.
+struct SightBlock {
+  std::array<Lanes, 9> R_CW;     // row by row
+  std::array<Lanes, 3> p_CW_mm;  // the world's origin
+  std::array<Lanes, 3> p_MQ_mm;  // the mark's centre, axes of O
+  std::array<Lanes, 3> normal_O;
+  Lanes radius2_mm2;  // of the disc or ball that was measured; 0: a point
+  std::array<Lanes, 2> focal_px, origin_px;
+  Lanes K;
+  std::array<Lanes, 2> u_px;
+  std::array<Lanes, 3> whitening;  // W with W' W = P: 11, 12, 22; weight 0 counts as 1 here
+  Lanes weight, active;            // active: 1 takes part in the estimate, 0 does not
 
-  Eigen::Matrix<double, 2, 6> J() const;
+  std::array<Lanes, 2> bend_px;  // what the lens adds to the place of the outline's image
+  std::array<Lanes, 2> dev_px;   // found - projected
+  Lanes depth_mm;
+  std::array<Lanes, 6> row1, row2;  // of W J, J = [A, -A [q]x], A the derivative by the mark's position
+  std::array<Lanes, 2> Wr;
+  std::array<bool, lane_count> visible;  // has an image at the pose of the linearisation
+
+  std::array<Lanes, 3> own, total;  // covariance of W r: 11, 12, 22
+  Lanes normalised;                 // deviation by its standard deviation
 };
 
-// The equations of all observations of a problem. Precondition: the problem's numbers were checked.
+// The equations of all observations of a problem. Precondition: the problem's numbers were checked; the
+// problem outlives the model.
 class PoseModel {
  public:
   explicit PoseModel(const PoseProblem& problem);
 
-  std::vector<Sight>& sights() { return sights_; }
-  const std::vector<Sight>& sights() const { return sights_; }
+  std::size_t size() const { return problem_.observations.size(); }
+  const Observation& observation(std::size_t i) const { return problem_.observations[i]; }
+  const Mark& mark(std::size_t i) const { return problem_.marks[observation(i).mark]; }
+  const CalibratedCamera& camera(std::size_t i) const { return problem_.cameras[observation(i).camera]; }
+  Eigen::Vector3d p_MQ_mm(std::size_t i) const { return mark(i).p_O_mm - centroid_O_mm_; }
+
+  bool active(std::size_t i) const { return block(i).active[lane(i)] > 0; }
+  void set_active(std::size_t i, bool active) { blocks_[i / lane_count].active[lane(i)] = active ? 1 : 0; }
   int active_count() const;
 
   bool planar() const { return planar_; }
@@ -75,35 +82,60 @@ class PoseModel {
 
   const Eigen::Vector3d& centroid_O_mm() const { return centroid_O_mm_; }
   double extent_mm() const { return extent_mm_; }  // root mean square distance of the marks from M
+  CentredPose centred(const Pose& X_WO) const;     // planar: the nearest pose in the plane
+  Pose pose(const CentredPose& pose) const;        // X_WO
 
-  CentredPose centred(const Pose& X_WO) const;  // planar: the nearest pose in the plane
-  Pose pose(const CentredPose& pose) const;     // X_WO
+  // The eccentricity of a disc's image has a part of perspective, exact at every pose, and a much smaller
+  // part of the lens. That one changes so slowly that it is held within some millimetres: true where it must
+  // be computed anew.
+  bool bends_are_old(const CentredPose& pose) const;
+  void refresh_bends(const CentredPose& pose);
 
-  // The eccentricity of each disc's image at this pose. It changes so slowly that it is held during the last
-  // steps.
-  void refresh_offsets(const CentredPose& pose);
-  // Linearises the active observations and adds them up. False when one of them has no image.
+  // Linearises all observations and adds up the active ones. False when one of these has no image.
   bool linearise(const CentredPose& pose, NormalEquations& equations);
-  // Linearises those that are not active, for their deviations.
-  void linearise_unused(const CentredPose& pose);
 
-  // Covariance of an observation's residual noise at the last linearisation: the mark's own, the system's and
-  // that of non-rigidity, in the units of r.
-  Eigen::Matrix2d own_covariance(const Sight& sight) const;
-  Eigen::Matrix2d total_covariance(const Sight& sight) const;
+  // At the last linearisation.
+  bool visible(std::size_t i) const { return block(i).visible[lane(i)]; }
+  Eigen::Vector2d dev_px(std::size_t i) const { return pick(i, block(i).dev_px); }
+  double rms_rad() const;                       // of the active observations
+  Eigen::Vector2d dev_mm(std::size_t i) const;  // at the mark's distance
+  Eigen::Vector2d Wr(std::size_t i) const { return pick(i, block(i).Wr); }
+  Eigen::Matrix<double, 2, 6> WJ(std::size_t i) const;
+
+  // Covariances of the whitened residuals at the last linearisation: by the marks' own covariance, and with
+  // that of the system and of non-rigidity. Plain: both are the unit matrix, for observations of any weight,
+  // and need not be computed.
+  bool plain() const { return plain_; }
+  void refresh_covariances();
+  Eigen::Matrix2d total_covariance(std::size_t i) const;
+
+  double normalised(std::size_t i) const { return block(i).normalised[lane(i)]; }
+  std::span<SightBlock> blocks() { return {blocks_.get(), block_count_}; }
+  std::span<const SightBlock> blocks() const { return {blocks_.get(), block_count_}; }
 
  private:
-  bool linearise(const CentredPose& pose, Sight& sight) const;
-  bool linearise_algebraic(const Eigen::Vector3d& p_C_mm, Sight& sight) const;
+  static std::size_t lane(std::size_t i) { return i % lane_count; }
+  const SightBlock& block(std::size_t i) const { return blocks_[i / lane_count]; }
+  static Eigen::Vector2d pick(std::size_t i, const std::array<Lanes, 2>& lanes) {
+    return {lanes[0][lane(i)], lanes[1][lane(i)]};
+  }
+  void fill(std::size_t i, const Observation& observation);
+  void centre();
+  void linearise_lane(const std::array<Lanes, 3>& p_C_mm, const std::array<Lanes, 3>& normal_C, std::size_t i,
+                      std::array<Lanes, 6>& WD);
+  Eigen::Matrix2d own_covariance_mm2(std::size_t i) const;
 
-  std::vector<Sight> sights_;
-  Residual residual_;
+  const PoseProblem& problem_;
+  std::size_t block_count_;
+  std::unique_ptr<SightBlock[]> blocks_;
+  bool algebraic_, planar_, plain_, has_discs_ = false, one_lens_ = true;
   double system_variance_px2_;
-  bool planar_;
   Pose X_WP_ = Pose::Identity();
   Eigen::Matrix<double, 6, 3> planar_basis_ = Eigen::Matrix<double, 6, 3>::Zero();
   Eigen::Vector3d centroid_O_mm_ = Eigen::Vector3d::Zero();
   double extent_mm_ = 1;
+  bool bends_known_ = false;
+  CentredPose bends_at_;
 };
 
 }  // namespace zeropose

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "measure/pose_solver.h"
+#include "measure/pose_precision.h"
 
 namespace zeropose {
 
@@ -13,13 +13,12 @@ namespace zeropose {
 struct Estimate {
   Solution solution;
   Precision precision;
-  std::vector<double> normalised;  // deviation of each observation by its standard deviation
-  double misfit = 0;               // sum of squared residuals by their total covariance, active observations
+  double misfit = 0;  // sum of squared residuals by their total covariance, active observations
 
   bool ok() const { return solution.status == SolverStatus::converged && precision.determined; }
 };
 
-// Estimates from a start and leaves the model linearised there.
+// Estimates from a start and leaves the model linearised there, the deviations normalised.
 Estimate estimate(PoseModel& model, const CentredPose& start);
 
 // Two explanations whose misfit differs by less are equally good: a likelihood ratio of 1000.
@@ -28,12 +27,12 @@ inline constexpr double equal_misfit = 13.815510557964274;
 struct Rejection {
   Code code = Code::internal;
   std::string reason;
-  Estimate estimate;                 // of what is left
   std::vector<std::size_t> removed;  // observations, worst first
+  bool explained = false;            // without some all others agree, even if it is not clear without which
 };
 
-// Precondition: `all` is ok() and the model is linearised there. Observations that are removed are inactive
-// afterwards.
-Rejection reject_wrong_marks(PoseModel& model, const Estimate& all);
+// Precondition: `current` is ok() and the model is linearised there. Observations that are removed are
+// inactive afterwards, and `current` is the estimate of what is left, the model linearised there.
+Rejection reject_wrong_marks(PoseModel& model, Estimate& current);
 
 }  // namespace zeropose

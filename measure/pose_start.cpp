@@ -29,12 +29,13 @@ struct Ray {
 
 std::vector<Ray> rays_of(const PoseModel& model) {
   std::vector<Ray> rays;
-  for (const Sight& sight : model.sights()) {
-    if (!sight.active) continue;
-    const auto direction_C = ray(*sight.camera, sight.u_px);
+  for (std::size_t i = 0; i < model.size(); ++i) {
+    if (!model.active(i)) continue;
+    const Pose& X_WC = model.camera(i).X_WC;
+    const auto direction_C = ray(model.camera(i).model, model.observation(i).u_px);
     if (!direction_C) continue;
-    const Vector3d d = (sight.R_CW.transpose() * *direction_C).normalized();
-    rays.push_back({sight.p_WC_mm, d, sight.p_MQ_mm, Matrix3d::Identity() - d * d.transpose()});
+    const Vector3d d = (X_WC.linear() * *direction_C).normalized();
+    rays.push_back({X_WC.translation(), d, model.p_MQ_mm(i), Matrix3d::Identity() - d * d.transpose()});
   }
   return rays;
 }

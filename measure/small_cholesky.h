@@ -39,11 +39,17 @@ class SmallCholesky {
     return ratio * ratio;
   }
 
-  Vector solve(Vector b) const {
+  // L^-1 b.
+  Vector forward(Vector b) const {
     for (int i = 0; i < n; ++i) {
       for (int k = 0; k < i; ++k) b(i) -= L_(i, k) * b(k);
       b(i) *= inverse_diagonal_(i);
     }
+    return b;
+  }
+
+  Vector solve(Vector b) const {
+    b = forward(b);
     for (int i = n - 1; i >= 0; --i) {
       for (int k = i + 1; k < n; ++k) b(i) -= L_(k, i) * b(k);
       b(i) *= inverse_diagonal_(i);

@@ -277,6 +277,16 @@ class Pose(Case):
             self.assertIn("301", err)
             self.assertTrue(answer["reason"])
 
+    def test_poses_that_cannot_be_told_apart_are_listed(self):
+        self.assertEqual(self.estimate(self.observations())[1]["alternatives"], [])
+        status, answer, err = self.estimate(self.observations(only=3))  # three marks of one camera
+        self.assertEqual((status, answer["status"], answer["code"]), (1, "failed", 401))
+        self.assertIsNone(answer["X_WO"])
+        self.assertIn("different poses", err)
+        self.assertIn(len(answer["alternatives"]), (2, 3, 4))
+        distances = [max(abs(a - b) for a, b in zip(X_WO, self.TRUTH)) for X_WO in answer["alternatives"]]
+        self.assertLess(min(distances), 1e-3)
+
     def test_wrong_input(self):
         found = self.observations()
         arguments = ("pose", "--cameras", self.camera_file, "--marks", self.mark_file, "--observations", found)

@@ -1,6 +1,7 @@
 // What no pose can be estimated from: refused by name (spec 85 R16), and bad numbers answered with a code.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "measure/pose.h"
@@ -122,6 +123,12 @@ TEST(PoseInput, AnswersWithACodeToNumbersThatCannotBeUsed) {
   refuses("covariance indefinite", [](CellScene&, Observations& o) { o[3].covariance_px2 << 1, 2, 2, 1; });
   refuses("covariance not symmetric",
           [](CellScene&, Observations& o) { o[3].covariance_px2 << 1, 0.5, 0, 1; });
+  refuses("radius", [](CellScene&, Observations& o) { o[3].radius_share = nan; });
+  refuses("twice", [](CellScene&, Observations& o) { o.push_back(o[3]); });
+  refuses("twice with another pixel", [](CellScene&, Observations& o) {
+    o.insert(o.begin(), o[3]);
+    o.front().u_px.x() += 1;
+  });
   refuses("weight", [](CellScene& s, Observations&) { s.job.marks[3].weight = -0.1; });
   refuses("weight above one", [](CellScene& s, Observations&) { s.job.marks[3].weight = 1.1; });
   refuses("weight nan", [](CellScene& s, Observations&) { s.job.marks[3].weight = nan; });
@@ -130,6 +137,22 @@ TEST(PoseInput, AnswersWithACodeToNumbersThatCannotBeUsed) {
   refuses("focal length", [](CellScene& s, Observations&) { s.cameras[1].model.fx_px = 0; });
   refuses("camera pose", [](CellScene& s, Observations&) { s.cameras[1].X_WC.translation().x() = nan; });
   refuses("system sigma", [](CellScene& s, Observations&) { s.job.system_sigma_px = -1; });
+}
+
+TEST(PoseInput, TakesAMarkFromEveryCameraOnceInAnyOrder) {
+  CellScene scene = car_body_points();
+  Random random(19);
+  for (CalibratedCamera& camera : scene.cameras) camera.X_WC = scene.cameras[0].X_WC;
+  scene.job.views.clear();
+  for (std::size_t camera = 0; camera < 4; ++camera)
+    for (std::size_t mark = 0; mark < 3; ++mark) scene.job.views.push_back({camera, mark});
+  auto observations = test::observe(scene.cameras, scene.job, Pose::Identity(), 0.1, random);
+  std::shuffle(observations.begin(), observations.end(), random);
+  const PoseResult result = estimate(scene, observations, Pose::Identity());
+  ASSERT_EQ(result.code, Code::ok) << result.reason;
+  EXPECT_EQ(result.effective_marks, 3);
+  EXPECT_EQ(result.effective_cameras, 4);
+  EXPECT_EQ(result.redundancy, 18);
 }
 
 TEST(PoseInput, SurvivesPixelsWithoutARay) {
