@@ -5,6 +5,8 @@
 #include <numbers>
 #include <vector>
 
+#include "measure/mark_sight.h"
+#include "measure/mark_verdict.h"
 #include "measure/pattern_fit.h"
 #include "measure/pattern_peaks.h"
 
@@ -21,7 +23,6 @@ constexpr double worth_following = 0.5;                // of the best peak's cor
 constexpr double rival_promising = 0.75, alike = 0.6;  // correlations: to go on with; of something like it
 constexpr double much_alike = 0.7;  // what stands out of the window must be, to be called the pattern
 constexpr double least_correlation = 0.85, least_share = 0.7;
-constexpr double saturated_share = 0.02;
 constexpr double stands_out_px = 1.5;
 constexpr double scale_range = 0.12, least_squeeze = 0.85, turn_slack_rad = 0.02;
 constexpr double blurred_px2 = 0.5;
@@ -41,9 +42,7 @@ bool usable(const Pattern* pattern) {
 }
 
 bool makes_sense(const MarkSearch& s) {
-  return usable(s.pattern) && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
-         (s.half_window_px.array() >= 0).all() && std::isfinite(s.direction_rad) &&
-         s.direction_tolerance_rad >= 0 && s.min_contrast > 0 && s.max_blur_px > 0;
+  return usable(s.pattern) && place_makes_sense(s) && directions_make_sense(s);
 }
 
 double tolerance_of(const MarkSearch& search) {
@@ -208,18 +207,6 @@ MarkFinding PatternSearcher::measured(const PatternCandidate& candidate, const P
   if (fit.iterations > 0) describe(fit, finding);
   finding.status = judge(fit, finding);
   return finding;
-}
-
-// How near to a found one a failed one came.
-int telling(const MarkFinding& finding) {
-  switch (finding.status) {
-    case MarkStatus::no_candidate:
-      return 1;
-    case MarkStatus::not_converged:
-      return 2;
-    default:
-      return 3;
-  }
 }
 
 // A second place counts where it explains its pixels nearly as well.
