@@ -60,8 +60,10 @@ GreyImage load_deep_image(const std::filesystem::path& path) {
   int used = 0;  // bits that are set in some pixel
   for (const std::uint16_t value : image.deep) used |= value;
   while (image.white < used) image.white = 2 * image.white + 1;
-  // Twelve bits at the upper end of sixteen are white at 4095 times 16. Eight are kept whatever the picture shows.
-  for (int lowest = 1; (used & lowest) == 0 && 2 * image.white >= 511 * lowest; lowest *= 2) image.white -= lowest;
+  // Twelve bits at the upper end of sixteen are white at 4095 times 16. Eight are kept whatever the picture
+  // shows.
+  for (int lowest = 1; (used & lowest) == 0 && 2 * image.white >= 511 * lowest; lowest *= 2)
+    image.white -= lowest;
   return image;
 }
 

@@ -5,7 +5,6 @@
 #include <numbers>
 #include <vector>
 
-#include "measure/mark_sight.h"
 #include "measure/mark_verdict.h"
 #include "measure/pattern_fit.h"
 #include "measure/pattern_peaks.h"
@@ -209,6 +208,18 @@ MarkFinding PatternSearcher::measured(const PatternCandidate& candidate, const P
   return finding;
 }
 
+// How near to a found one a failed one came: what was measured at all says more than a limit of size or turn.
+int nearness(const MarkFinding& finding) {
+  switch (finding.status) {
+    case MarkStatus::no_candidate:
+      return 1;
+    case MarkStatus::not_converged:
+      return 2;
+    default:
+      return 3;
+  }
+}
+
 // A second place counts where it explains its pixels nearly as well.
 bool rivals(const MarkFinding& a, const MarkFinding& b) {
   const double unlike_a = 1 - std::sqrt(a.quality), unlike_b = 1 - std::sqrt(b.quality);
@@ -221,8 +232,8 @@ bool rivals(const MarkFinding& a, const MarkFinding& b) {
 bool better(const MarkFinding& a, const MarkFinding& b) {
   const bool found_a = a.status == MarkStatus::found, found_b = b.status == MarkStatus::found;
   if (found_a != found_b) return found_a;
-  if (found_a || telling(a) == telling(b)) return a.quality > b.quality;
-  return telling(a) > telling(b);
+  if (found_a || nearness(a) == nearness(b)) return a.quality > b.quality;
+  return nearness(a) > nearness(b);
 }
 
 MarkFinding PatternSearcher::run() {
