@@ -57,8 +57,13 @@ GreyImage load_deep_image(const std::filesystem::path& path) {
   if (picture.depth() == CV_8U) return bytes_of(picture);
   GreyImage image{picture.cols, picture.rows, {}, {}, 511};
   image.deep.assign(picture.begin<std::uint16_t>(), picture.end<std::uint16_t>());
-  const int highest = *std::max_element(image.deep.begin(), image.deep.end());
-  while (image.white < highest) image.white = 2 * image.white + 1;
+  int used = 0;  // bits that are set in some pixel
+  for (const std::uint16_t value : image.deep) used |= value;
+  while (image.white < used) image.white = 2 * image.white + 1;
+  // Twelve bits at the upper end of sixteen are white at 4095 times 16. Eight are kept whatever the picture
+  // shows.
+  for (int lowest = 1; (used & lowest) == 0 && 2 * image.white >= 511 * lowest; lowest *= 2)
+    image.white -= lowest;
   return image;
 }
 

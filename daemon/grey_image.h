@@ -26,7 +26,7 @@ struct GreyImage {
 GreyImage load_grey_image(const std::filesystem::path& path);
 
 // The same, but 16 bit as they are: white is the highest value of the least number of bits, from nine, that
-// holds all pixels.
+// holds all pixels, without the low bits that no pixel uses.
 GreyImage load_deep_image(const std::filesystem::path& path);
 
 }  // namespace zeropose

@@ -16,8 +16,9 @@ constexpr double narrowest_px = 2.5;
 constexpr double parallel_rad = 0.1;
 constexpr double end_px = 3;             // left out where an arm ends in the window
 constexpr double least_arm_px = 6;       // from the other bar's edge
+constexpr int widest_dirt_px = 8;        // on an arm; what is seen behind a wider gap is another one's
 constexpr std::size_t most_lines = 20;   // four of them the cross's
-constexpr std::size_t most_crosses = 6;  // fits per window
+constexpr std::size_t most_crosses = 6;  // fits per window where one is wanted
 
 // Two edges back to back.
 struct CrossBar {
@@ -70,6 +71,7 @@ double arm_length(const GreyWindow& window, const CrossStart& cross, const Cross
   const double sign = bright ? -1 : 1, first = bar.half_px + 3;
   const Eigen::Vector2d side = (bar.half_px + 2.5) * bar.across();
   std::vector<bool> seen;
+  int unseen = 0;
   double t = first;
   for (;; t += 1) {
     const Eigen::Vector2d on = cross.centre + sense * t * bar.along();
@@ -78,6 +80,8 @@ double arm_length(const GreyWindow& window, const CrossStart& cross, const Cross
     const double less = std::min(sign * (grey_between(window, on + side) - middle),
                                  sign * (grey_between(window, on - side) - middle));
     seen.push_back(less > 0.4 * cross.contrast());
+    unseen = seen.back() ? 0 : unseen + 1;
+    if (unseen > widest_dirt_px && int(seen.size()) > 2 * unseen) break;
   }
   const SeenRun run = longest_run(seen);
   const bool open = run.last + 2 >= int(seen.size());
@@ -109,10 +113,8 @@ std::optional<CrossStart> cross_of(const GreyWindow& window, const CrossBar& one
   return cross;
 }
 
-std::vector<CrossStart> crosses_of(const GreyWindow& window, const MarkSearch& search) {
-  LineLimits limits = line_limits_of(search);
-  limits.most = most_lines;
-  const std::vector<EdgeLine> lines = find_lines(window, limits);
+std::vector<CrossStart> crosses_of(const GreyWindow& window, const MarkSearch& search, HowMany wanted) {
+  const std::vector<EdgeLine> lines = find_lines(window, line_limits_of(search, wanted, most_lines));
   std::vector<CrossBar> bars;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     for (std::size_t j = i + 1; j < lines.size(); ++j) {
@@ -128,7 +130,7 @@ std::vector<CrossStart> crosses_of(const GreyWindow& window, const MarkSearch& s
   std::stable_sort(crosses.begin(), crosses.end(), [](const CrossStart& a, const CrossStart& b) {
     return a.contrast() * a.span() > b.contrast() * b.span();
   });
-  crosses.resize(std::min(most_crosses, crosses.size()));
+  crosses.resize(std::min(wanted.one() ? most_crosses : wanted.most, crosses.size()));
   return crosses;
 }
 
@@ -174,17 +176,15 @@ JudgedMark judged_cross(const GreyWindow& window, const MarkSearch& search, cons
 
 }  // namespace
 
-MarkFinding find_cross(const ImageView& image, const MarkSearch& search) {
+MarkSight look_for_crosses(const ImageView& image, const MarkSearch& search, HowMany wanted) {
   const OpenedWindow opened = open_window(image, search, true);
-  MarkFinding none;
-  none.status = opened.status;
-  if (opened.status != MarkStatus::found) return none;
+  if (opened.status != MarkStatus::found) return sight_without(opened.status);
   std::vector<JudgedMark> marks;
   ContourWorkspace workspace;
-  for (const CrossStart& cross : crosses_of(opened.greys, search)) {
+  for (const CrossStart& cross : crosses_of(opened.greys, search, wanted)) {
     marks.push_back(judged_cross(opened.greys, search, cross, workspace));
   }
-  return chosen_mark(marks, opened.greys, search);
+  return sight_of(marks, opened.greys, search, wanted);
 }
 
 }  // namespace zeropose

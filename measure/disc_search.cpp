@@ -15,37 +15,6 @@ namespace {
 
 constexpr std::size_t most_candidates = 64;  // fits per window and look, where one is wanted
 constexpr double widest_covered = 24;        // a window in units of the mark: where outlines are put together
-constexpr double rival_contrast = 0.4;       // of the best one's: then it is a rival
-
-// How near to a found mark a failed one came.
-int telling(const MarkFinding& finding) {
-  switch (finding.status) {
-    case MarkStatus::no_candidate:  // with a size: an ellipse, but too large or too flat
-      return finding.diameter_px > 0 ? 2 : 0;
-    case MarkStatus::too_small:
-      return 1;
-    case MarkStatus::not_converged:
-      return 2;
-    case MarkStatus::low_contrast:
-      return 3;
-    case MarkStatus::blurred:
-      return 4;
-    case MarkStatus::cut_off:
-      return 5;
-    default:
-      return 0;
-  }
-}
-
-bool stands(const MarkFinding& finding) {
-  return finding.status == MarkStatus::found || finding.status == MarkStatus::saturated;
-}
-
-// The same thing, taken up twice from different grey levels, or once with its glint and once without.
-bool same_place(const MarkFinding& a, const MarkFinding& b) {
-  const double room = a.status == b.status ? 0.5 : 0.5 + 0.1 * a.diameter_px;
-  return (a.u_px - b.u_px).norm() < room && std::abs(a.diameter_px - b.diameter_px) < 2 * room;
-}
 
 MarkSight sight_of(const ImageView& image, const MarkSearch& search, const CandidateSearch& seen,
                    HowMany wanted, MarkWorkspace& workspace) {
@@ -87,21 +56,17 @@ MarkSight look_for_one(const ImageView& image, const MarkSearch& search, std::op
   return sight;
 }
 
-// At grey levels so fine that the least contrast does not slip through.
-MarkSight look_for_all(const ImageView& image, const MarkSearch& search, CandidateSearch seen,
-                       std::size_t most, MarkWorkspace& workspace) {
-  while (!(seen.step_grey < 0.75 * search.min_contrast)) {
-    auto finer = workspace.candidates.finer(image, search);
-    if (!finer) break;
-    seen = std::move(*finer);
-  }
-  return sight_of(image, search, seen, {most}, workspace);
+// One: eight levels tell at once a mark that has six tenths of the window's range. All: so fine that the
+// least contrast does not slip through.
+LevelPlan plan_for(const MarkSearch& search, HowMany wanted) {
+  if (wanted.one()) return {LevelPlan{}.widest_step_grey, 8};
+  return {0.75 * search.min_contrast / CandidateFinder::step_grey_by_step, 255};
 }
 
 MarkSight look_at_regions(const ImageView& image, const MarkSearch& search, CandidateSearch seen,
                           HowMany wanted, MarkWorkspace& workspace) {
   return wanted.one() ? look_for_one(image, search, std::move(seen), workspace)
-                      : look_for_all(image, search, std::move(seen), wanted.most, workspace);
+                      : sight_of(image, search, seen, wanted, workspace);
 }
 
 double grey_near(const ImageView& image, const Eigen::Vector2d& at) {
@@ -152,44 +117,16 @@ void look_at_outlines(const ImageView& image, const PixelWindow& window, const M
 
 }  // namespace
 
-void MarkSight::take(const MarkFinding& finding) {
-  if (!stands(finding)) {
-    if (telling(finding) >= telling(nearest)) nearest = finding;
-    return;
-  }
-  const auto known = std::find_if(standing.begin(), standing.end(),
-                                  [&](const MarkFinding& other) { return same_place(other, finding); });
-  if (known != standing.end()) {
-    if (known->status != MarkStatus::saturated) return;
-    standing.erase(known);
-  }
-  const auto behind = std::find_if(standing.begin(), standing.end(), [&](const MarkFinding& other) {
-    return other.contrast < finding.contrast;
-  });
-  standing.insert(behind, finding);
-}
-
-bool MarkSight::found() const {
-  return std::any_of(standing.begin(), standing.end(),
-                     [](const MarkFinding& finding) { return finding.status == MarkStatus::found; });
-}
-
-MarkFinding MarkSight::only() const {
-  if (standing.empty()) return nearest;
-  MarkFinding best = standing.front();
-  const bool rival = standing.size() > 1 && standing[1].contrast > rival_contrast * best.contrast;
-  if (rival || crowded) best.status = MarkStatus::ambiguous;
-  return best;
-}
-
 MarkSight look_for_discs(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
                          HowMany wanted, MarkWorkspace& workspace) {
   CandidateFinder& finder = workspace.candidates;
   workspace.tolerance.noise_grey =
       2 * noise_grey(image, window) + 0.5;  // shot noise: more where it is bright
-  MarkSight sight = look_at_regions(image, search, finder.first(image, window, search), wanted, workspace);
+  const LevelPlan plan = plan_for(search, wanted);
+  MarkSight sight =
+      look_at_regions(image, search, finder.first(image, window, search, plan), wanted, workspace);
   if (sight.found()) return sight;
-  if (auto seen = finder.flattened(image, search)) {
+  if (auto seen = finder.flattened(image, search, plan)) {
     MarkSight flat = look_at_regions(image, search, *std::move(seen), wanted, workspace);
     flat.take(sight.nearest);
     for (const MarkFinding& finding : sight.standing) flat.take(finding);

@@ -2,63 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
+
+#include "measure/mark_verdict.h"
 
 namespace zeropose {
 namespace {
 
-constexpr int least_side_px = 8;  // of a window
-constexpr double model_share = 0.04, most_noise_share = 0.3, saturated_share = 0.02;
-constexpr double rough_px = 0.15;       // what a real outline may deviate, rms
-constexpr double noise_sigmas = 4;      // how far two variances of the same noise may differ
-constexpr double rival_strength = 0.5;  // of the best one's: then it is a rival
+constexpr int least_side_px = 8;            // of a window
+constexpr std::size_t lines_for_all = 120;  // each takes a look at all points that are left
+constexpr double rival_strength = 0.5;      // of the best one's: then it is a rival
 constexpr double same_px = 1, same_rad = 0.1;
 constexpr double most_sigma_px = 0.3;  // of a place that counts
 
-bool makes_sense(const ImageView& image, const MarkSearch& s, bool limits_sizes) {
-  const bool sizes = !limits_sizes || (s.min_diameter_px > 0 && s.min_diameter_px <= s.max_diameter_px &&
-                                       s.min_axis_ratio > 0 && s.min_axis_ratio <= 1);
-  return image.data != nullptr && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
-         (s.half_window_px.array() >= 0).all() && std::isfinite(s.min_diameter_px) &&
-         std::isfinite(s.max_diameter_px) && sizes && std::isfinite(s.min_contrast) && s.min_contrast > 0 &&
-         std::isfinite(s.max_blur_px) && s.max_blur_px > 0 && std::isfinite(s.direction_rad) &&
-         s.direction_tolerance_rad >= 0 && std::isfinite(s.opening_rad) && s.opening_tolerance_rad >= 0;
-}
-
-// Residuals across the outline: noise as beside it, and a small share of the contrast.
-bool explains(const ContourFit& fit, double contrast) {
-  const double noise = std::min(fit.flat_rms, most_noise_share * contrast), model = model_share * contrast;
-  const double spread = std::sqrt(4 / std::max(1.0, fit.pixels));
-  const double outline2 = 2.5 * fit.outline_noise_px * fit.outline_noise_px + rough_px * rough_px;
-  return fit.edge_rms * fit.edge_rms < noise * noise * (1 + noise_sigmas * spread) + model * model &&
-         fit.outline_px * fit.outline_px < outline2;
-}
-
-// How near to a found mark a failed one came.
-int telling(MarkStatus status) {
-  switch (status) {
-    case MarkStatus::no_candidate:
-      return 1;
-    case MarkStatus::too_small:
-      return 2;
-    case MarkStatus::not_converged:
-      return 3;
-    case MarkStatus::low_contrast:
-      return 4;
-    case MarkStatus::blurred:
-      return 5;
-    case MarkStatus::cut_off:
-      return 6;
-    case MarkStatus::saturated:
-      return 7;
-    default:
-      return 0;
-  }
-}
-
-bool passed(const JudgedMark& mark) {
-  return mark.finding.status == MarkStatus::found || mark.finding.status == MarkStatus::saturated;
-}
+bool passed(const JudgedMark& mark) { return stands(mark.finding); }
 
 // What holds a mark in some direction by its last pixels only is not held.
 bool sure_place(const MarkFinding& finding, MarkKind kind) {
@@ -73,6 +31,33 @@ bool same_mark(const MarkFinding& a, const MarkFinding& b) {
          std::abs(wrapped_rad(a.direction_rad - b.direction_rad)) < same_rad;
 }
 
+MarkFinding chosen_mark(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search) {
+  for (JudgedMark& mark : marks)
+    if (mark.finding.status == MarkStatus::found && !sure_place(mark.finding, search.kind))
+      mark.finding.status = MarkStatus::not_converged;
+  JudgedMark best;
+  best.finding.status = MarkStatus::no_candidate;
+  if (marks.empty()) {
+    const auto [low, high] = std::minmax_element(window.grey.begin(), window.grey.end());
+    if (*high - *low < search.min_contrast) best.finding.status = MarkStatus::low_contrast;
+  }
+  for (const JudgedMark& mark : marks) {
+    const bool better =
+        passed(mark) == passed(best)
+            ? (passed(mark) ? mark.strength > best.strength : telling(mark.finding) > telling(best.finding))
+            : passed(mark);
+    if (better) best = mark;
+  }
+  if (!passed(best)) return best.finding;
+  for (const JudgedMark& mark : marks) {
+    if (passed(mark) && !same_mark(mark.finding, best.finding) &&
+        mark.strength > rival_strength * best.strength) {
+      best.finding.status = MarkStatus::ambiguous;
+    }
+  }
+  return best.finding;
+}
+
 }  // namespace
 
 OpenedWindow open_window(const ImageView& image, const MarkSearch& search, bool limits_sizes) {
@@ -80,7 +65,11 @@ OpenedWindow open_window(const ImageView& image, const MarkSearch& search, bool 
   opened.status = MarkStatus::outside_image;
   if (image.data == nullptr || image.width_px < 2 || image.height_px < 2) return opened;
   opened.status = MarkStatus::not_searched;
-  if (!makes_sense(image, search, limits_sizes)) return opened;
+  if (!place_makes_sense(search) || !directions_make_sense(search) ||
+      !std::isfinite(search.min_diameter_px) || !std::isfinite(search.max_diameter_px) ||
+      (limits_sizes && !sizes_make_sense(search))) {
+    return opened;
+  }
   opened.status = MarkStatus::outside_image;
   opened.greys.pixels = window_of(image, search);
   if (opened.greys.pixels.empty()) return opened;
@@ -98,14 +87,15 @@ MarkFinding judged_fit(const ContourFit& fit, const MarkSearch& search) {
   finding.contrast = std::abs(fit.background_grey - fit.mark_grey);
   finding.blur_px = fit.blur_px;
   finding.outline_share = fit.outline_share;
-  const double noise = fit.flat_rms > 0 ? fit.flat_rms : 0.02 * finding.contrast;
-  const double excess = std::max(0.0, fit.edge_rms * fit.edge_rms - noise * noise);
-  finding.quality = fit.converged ? 1 / (1 + excess / std::pow(model_share * finding.contrast, 2)) : 0;
+  const FitEvidence evidence{finding.contrast,     fit.edge_rms,
+                             fit.flat_rms,         fit.outline_px,
+                             fit.outline_noise_px, std::sqrt(4 / std::max(1.0, fit.pixels))};
+  finding.quality = fit.converged ? quality_of(evidence) : 0;
   if (!fit.converged) {
     finding.status = MarkStatus::not_converged;
   } else if (fit.saturated_share > saturated_share) {
     finding.status = MarkStatus::saturated;
-  } else if (!explains(fit, finding.contrast)) {
+  } else if (!pixels_agree(evidence, plain_model_share, std::numeric_limits<double>::infinity())) {
     finding.status = MarkStatus::not_converged;
   } else if (finding.contrast < search.min_contrast) {
     finding.status = MarkStatus::low_contrast;
@@ -117,31 +107,23 @@ MarkFinding judged_fit(const ContourFit& fit, const MarkSearch& search) {
   return finding;
 }
 
-MarkFinding chosen_mark(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search) {
-  for (JudgedMark& mark : marks)
-    if (mark.finding.status == MarkStatus::found && !sure_place(mark.finding, search.kind))
-      mark.finding.status = MarkStatus::not_converged;
-  JudgedMark best;
-  best.finding.status = MarkStatus::no_candidate;
-  if (marks.empty()) {
-    const auto [low, high] = std::minmax_element(window.grey.begin(), window.grey.end());
-    if (*high - *low < search.min_contrast) best.finding.status = MarkStatus::low_contrast;
-  }
+MarkSight sight_of(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search,
+                   HowMany wanted) {
+  MarkSight sight;
+  sight.nearest = chosen_mark(marks, window, search);
+  std::stable_sort(marks.begin(), marks.end(),
+                   [](const JudgedMark& a, const JudgedMark& b) { return a.strength > b.strength; });
+  if (wanted.one() && stands(sight.nearest)) sight.standing = {sight.nearest};
+  if (wanted.one()) return sight;
   for (const JudgedMark& mark : marks) {
-    const bool better = passed(mark) == passed(best)
-                            ? (passed(mark) ? mark.strength > best.strength
-                                            : telling(mark.finding.status) > telling(best.finding.status))
-                            : passed(mark);
-    if (better) best = mark;
+    const bool known = std::any_of(sight.standing.begin(), sight.standing.end(),
+                                   [&](const MarkFinding& other) { return same_mark(mark.finding, other); });
+    if (passed(mark) && sure_place(mark.finding, search.kind) && !known)
+      sight.standing.push_back(mark.finding);
   }
-  if (!passed(best)) return best.finding;
-  for (const JudgedMark& mark : marks) {
-    if (passed(mark) && !same_mark(mark.finding, best.finding) &&
-        mark.strength > rival_strength * best.strength) {
-      best.finding.status = MarkStatus::ambiguous;
-    }
-  }
-  return best.finding;
+  std::stable_sort(sight.standing.begin(), sight.standing.end(),
+                   [](const MarkFinding& a, const MarkFinding& b) { return a.contrast > b.contrast; });
+  return sight;
 }
 
 double wrapped_line_rad(double angle_rad) { return std::remainder(angle_rad, std::numbers::pi); }
@@ -154,8 +136,10 @@ Eigen::Vector2d to_window(const GreyWindow& window, const Eigen::Vector2d& u_px)
   return u_px - Eigen::Vector2d(window.pixels.u0, window.pixels.v0);
 }
 
-LineLimits line_limits_of(const MarkSearch& search) {
+LineLimits line_limits_of(const MarkSearch& search, HowMany wanted, std::size_t lines_for_one) {
   LineLimits limits;
+  limits.most = wanted.one() ? lines_for_one : lines_for_all;
+  limits.all_pieces = !wanted.one();
   limits.min_contrast = search.min_contrast;
   limits.max_blur_px = search.max_blur_px;
   return limits;

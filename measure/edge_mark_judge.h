@@ -7,6 +7,7 @@
 
 #include "measure/contour_fit.h"
 #include "measure/line_search.h"
+#include "measure/mark_sight.h"
 #include "measure/marks.h"
 
 namespace zeropose {
@@ -29,9 +30,11 @@ struct JudgedMark {
   double strength = 0;
 };
 
-// The strongest that passed; ambiguous, with its numbers, if another one is nearly as strong; else the most
-// telling failure. None: no_candidate, or low_contrast if the window has less than the search's.
-MarkFinding chosen_mark(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search);
+// One wanted: the strongest that passed; ambiguous, with its numbers, if another one is nearly as strong.
+// All: those that passed, each thing once. Else the most telling failure; without any, no_candidate, or
+// low_contrast if the window has less than the search's.
+MarkSight sight_of(std::vector<JudgedMark> marks, const GreyWindow& window, const MarkSearch& search,
+                   HowMany wanted);
 
 // Difference of two directions of a line, which has no sense: -pi/2..pi/2.
 double wrapped_line_rad(double angle_rad);
@@ -40,6 +43,7 @@ double wrapped_line_rad(double angle_rad);
 Eigen::Vector2d to_image(const GreyWindow& window, const Eigen::Vector2d& at);
 Eigen::Vector2d to_window(const GreyWindow& window, const Eigen::Vector2d& u_px);
 
-LineLimits line_limits_of(const MarkSearch& search);
+// Where all marks are wanted: all pieces of the strongest lines.
+LineLimits line_limits_of(const MarkSearch& search, HowMany wanted, std::size_t lines_for_one);
 
 }  // namespace zeropose

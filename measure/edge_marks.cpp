@@ -11,10 +11,10 @@ namespace zeropose {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double end_px = 3;             // left out where an edge ends in the window
-constexpr double meeting_px = 7;         // an arm is seen from that near to the corner on
-constexpr double beyond_px = 6;          // and not further behind it
-constexpr std::size_t most_corners = 8;  // fits per window
+constexpr double end_px = 3;                             // left out where an edge ends in the window
+constexpr double meeting_px = 7;                         // an arm is seen from that near to the corner on
+constexpr double beyond_px = 6;                          // and not further behind it
+constexpr std::size_t most_corners = 8, most_edges = 8;  // fits per window where one is wanted
 
 double least_length(const MarkSearch& search) { return std::max(edge_least_px, search.min_diameter_px); }
 
@@ -176,7 +176,7 @@ std::optional<CornerStart> corner_of(const EdgeLine& one, const EdgeLine& other,
 }
 
 std::vector<CornerStart> corners_of(const std::vector<EdgeLine>& lines, const MarkSearch& search,
-                                    const GreyWindow& window) {
+                                    const GreyWindow& window, HowMany wanted) {
   std::vector<CornerStart> corners;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     for (std::size_t j = 0; j < lines.size(); ++j) {
@@ -188,7 +188,7 @@ std::vector<CornerStart> corners_of(const std::vector<EdgeLine>& lines, const Ma
   std::stable_sort(corners.begin(), corners.end(), [&strength](const CornerStart& a, const CornerStart& b) {
     return strength(a) > strength(b);
   });
-  corners.resize(std::min(most_corners, corners.size()));
+  corners.resize(std::min(wanted.one() ? most_corners : wanted.most, corners.size()));
   return corners;
 }
 
@@ -226,37 +226,35 @@ JudgedMark judged_corner(const GreyWindow& window, const MarkSearch& search, con
 
 }  // namespace
 
-MarkFinding find_edge(const ImageView& image, const MarkSearch& search) {
+MarkSight look_for_edges(const ImageView& image, const MarkSearch& search, HowMany wanted) {
   const OpenedWindow opened = open_window(image, search, false);
-  MarkFinding none;
-  none.status = opened.status;
-  if (opened.status != MarkStatus::found) return none;
-  LineLimits limits = line_limits_of(search);
+  if (opened.status != MarkStatus::found) return sight_without(opened.status);
+  LineLimits limits = line_limits_of(search, wanted, most_edges);
   limits.direction_rad = search.direction_rad;
   limits.tolerance_rad = search.direction_tolerance_rad + 0.05;
-  limits.most = 8;
   const std::vector<EdgeLine> lines = find_lines(opened.greys, limits);
   std::vector<JudgedMark> marks;
   ContourWorkspace workspace;
   for (const EdgeLine& line : lines) marks.push_back(judged_edge(opened.greys, search, line, workspace));
-  return chosen_mark(marks, opened.greys, search);
+  return sight_of(marks, opened.greys, search, wanted);
 }
 
-MarkFinding find_corner(const ImageView& image, const MarkSearch& asked) {
+MarkSight look_for_corners(const ImageView& image, const MarkSearch& asked, HowMany wanted) {
   const OpenedWindow opened = open_window(image, asked, false);
-  MarkFinding none;
-  none.status = opened.status;
-  if (opened.status != MarkStatus::found) return none;
+  if (opened.status != MarkStatus::found) return sight_without(opened.status);
   const MarkSearch search = convex(asked);
-  const std::vector<EdgeLine> lines = find_lines(opened.greys, line_limits_of(search));
+  const std::vector<EdgeLine> lines =
+      find_lines(opened.greys, line_limits_of(search, wanted, LineLimits{}.most));
   std::vector<JudgedMark> marks;
   ContourWorkspace workspace;
-  for (const CornerStart& corner : corners_of(lines, search, opened.greys)) {
+  for (const CornerStart& corner : corners_of(lines, search, opened.greys, wanted)) {
     marks.push_back(judged_corner(opened.greys, search, corner, workspace));
   }
-  MarkFinding finding = chosen_mark(marks, opened.greys, search);
-  if (asked.opening_rad > pi) finding.direction_rad = wrapped_rad(finding.direction_rad + pi);
-  return finding;
+  MarkSight sight = sight_of(marks, opened.greys, search, wanted);
+  if (asked.opening_rad <= pi) return sight;
+  sight.nearest.direction_rad = wrapped_rad(sight.nearest.direction_rad + pi);
+  for (MarkFinding& mark : sight.standing) mark.direction_rad = wrapped_rad(mark.direction_rad + pi);
+  return sight;
 }
 
 }  // namespace zeropose

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "measure/image.h"
+#include "measure/mark_sight.h"
 #include "measure/marks.h"
 
 namespace zeropose {
@@ -18,22 +19,22 @@ namespace zeropose {
 // min_diameter_px (edge_least_px if that is smaller). max_diameter_px, min_axis_ratio and bright do not
 // count. Too near to the window's border for its band: cut_off; nearer than 3 px it is not seen.
 inline constexpr double unknown_along_px2 = 1e6, edge_least_px = 8;
-MarkFinding find_edge(const ImageView& image, const MarkSearch& search);
+MarkSight look_for_edges(const ImageView& image, const MarkSearch& search, HowMany wanted);
 
 // Where two edges meet. diameter_px: the longer arm that is seen, axis_ratio: the shorter one by it; each at
 // least min_diameter_px (edge_least_px if that is smaller). max_diameter_px and min_axis_ratio do not count.
 // An edge that goes on behind the corner makes it none. opening_rad: up to pi the mark fills the angle;
 // beyond, direction_rad still points from the corner into the mark.
-MarkFinding find_corner(const ImageView& image, const MarkSearch& search);
+MarkSight look_for_corners(const ImageView& image, const MarkSearch& search, HowMany wanted);
 
 // A long hole, also seen obliquely: any affine image of a stadium that is longer than slot_least_ratio times
 // its width, which is to be five times the blur. diameter_px: its length, axis_ratio: its width by that.
 inline constexpr double slot_least_ratio = 1.2;
-MarkFinding find_slot(const ImageView& image, const MarkSearch& search);
+MarkSight look_for_slots(const ImageView& image, const MarkSearch& search, HowMany wanted);
 
 // Two bars of equal width. u_px: where their middle lines meet; diameter_px: the longer span that is seen;
 // axis_ratio: the bars' width by that (min_axis_ratio does not count). Arms may end in the window or reach
 // beyond it; each must be seen for 6 px from the other bar.
-MarkFinding find_cross(const ImageView& image, const MarkSearch& search);
+MarkSight look_for_crosses(const ImageView& image, const MarkSearch& search, HowMany wanted);
 
 }  // namespace zeropose

@@ -229,13 +229,21 @@ void judge_outline(const Descent& d, EllipseFit& fit) {
   fit.outline_noise_px = std::sqrt(noise_square);
 }
 
+// The block of N^-1 that belongs to the centre.
+Eigen::Matrix2d inverse_of_centre(const SmallCholesky<unknowns>& solver) {
+  const Unknowns u = solver.solve(Unknowns::Unit(cu)), v = solver.solve(Unknowns::Unit(cv));
+  Eigen::Matrix2d block;
+  block << u(cu), v(cu), v(cu), v(cv);
+  return block;
+}
+
 EllipseFit report(const Descent& d) {
   const EllipseBand& band = d.band;
   EllipseFit fit;
   fit.iterations = d.iterations;
   fit.settled = d.settled;
   const SmallCholesky<unknowns> solver(d.normal.N);
-  fit.covariance_px2 = variance_of(d.normal, band) * solver.inverse().topLeftCorner<2, 2>();
+  fit.covariance_px2 = variance_of(d.normal, band) * inverse_of_centre(solver);
   fit.centre_px = d.state.at.head<2>() + Eigen::Vector2d(band.origin_u, band.origin_v);
   fit.shape_px2 = d.state.shape();
   const double light = 1 + d.state.at(gx) * d.state.at(cu) + d.state.at(gy) * d.state.at(cv);

@@ -101,15 +101,40 @@ void unpack(const Products& products, Wanted wanted, Normal& normal) {
   }
 }
 
-[[gnu::always_inline]] inline void add_sectors(const Block& block, const float* px, const float* py,
-                                               const Constants& k, std::size_t n, Sectors& sectors) {
-  for (std::size_t i = 0; i < n; ++i) {
+// Sums by sector. Neighbouring pixels lie in the same one, and a sum that is added to at every pixel waits
+// for itself each time: so four take turns.
+struct SectorSums {
+  static constexpr std::size_t turns = 4;
+  float rs[turns][Sectors::count] = {}, ss[turns][Sectors::count] = {};
+
+  Sectors total() const {
+    Sectors sum;
+    for (std::size_t k = 0; k < Sectors::count; ++k) {
+      sum.rs[k] = (rs[0][k] + rs[1][k]) + (rs[2][k] + rs[3][k]);
+      sum.ss[k] = (ss[0][k] + ss[1][k]) + (ss[2][k] + ss[3][k]);
+    }
+    return sum;
+  }
+};
+
+// Pixels beyond the valid ones have slope 0.
+[[gnu::always_inline]] inline void add_sectors(const Block& __restrict block, const float* __restrict px,
+                                               const float* __restrict py, const Constants& k,
+                                               SectorSums& __restrict sums) {
+  int sector[block_size];
+  float rs[block_size], ss[block_size];
+  for (std::size_t i = 0; i < block_size; ++i) {
     const float x = px[i] - k.u, y = py[i] - k.v, ax = std::abs(x), ay = std::abs(y);
-    const std::size_t octant = (x < 0 ? 1U : 0U) + (y < 0 ? 2U : 0U) + (ax < ay ? 4U : 0U);
+    const int octant = (x < 0 ? 1 : 0) + (y < 0 ? 2 : 0) + (ax < ay ? 4 : 0);
     const bool upper = std::min(ax, ay) > 0.4142F * std::max(ax, ay);  // tan 22.5 deg
-    const float du = block.row[cu][i], dv = block.row[cv][i], square = du * du + dv * dv;
-    sectors.rs[2 * octant + upper] += block.row[unknowns][i] * std::sqrt(square);
-    sectors.ss[2 * octant + upper] += square;
+    sector[i] = 2 * octant + (upper ? 1 : 0);
+    const float du = block.row[cu][i], dv = block.row[cv][i];
+    ss[i] = du * du + dv * dv;
+    rs[i] = block.row[unknowns][i] * std::sqrt(ss[i]);
+  }
+  for (std::size_t i = 0; i < block_size; ++i) {
+    sums.rs[i % SectorSums::turns][sector[i]] += rs[i];
+    sums.ss[i % SectorSums::turns][sector[i]] += ss[i];
   }
 }
 
@@ -118,7 +143,7 @@ void unpack(const Products& products, Wanted wanted, Normal& normal) {
   const Constants constants(state);
   Products products;
   Block block;
-  sectors = {};
+  SectorSums by_sector;
   const std::size_t n = band.size();
   for (std::size_t i = 0; i < n; i += stride * block_size) {
     differentiate(&band.grey[i], &band.x[i], &band.y[i], constants, block);
@@ -127,9 +152,10 @@ void unpack(const Products& products, Wanted wanted, Normal& normal) {
       for (auto& row : block.row) std::fill(row + valid, row + block_size, 0.0F);
     }
     add_products(block, wanted, products);
-    if (wanted == Wanted::gradient) add_sectors(block, &band.x[i], &band.y[i], constants, valid, sectors);
+    if (wanted == Wanted::gradient) add_sectors(block, &band.x[i], &band.y[i], constants, by_sector);
   }
   unpack(products, wanted, normal);
+  sectors = by_sector.total();
   normal.count = double(n);
 }
 

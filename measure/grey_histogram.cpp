@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "measure/tally.h"
+
 namespace zeropose {
 
 GreyHistogram::GreyHistogram(const SearchImage& image, const MarkSearch& search) {
@@ -12,10 +14,13 @@ GreyHistogram::GreyHistogram(const SearchImage& image, const MarkSearch& search)
   const double enough = std::sqrt(double(image.width()) * image.height() / 6000);
   const int least = mark > 400 ? 3 : mark > 20 ? 2 : 1;
   const int stride = std::max(least, static_cast<int>(std::min(enough, 0.4 * diameter)));
+  Tally<256> greys;
+  std::size_t turn = 0;
   for (int v = 0; v < image.height(); v += stride) {
     const std::uint8_t* row = image.row(v);
-    for (int u = 0; u < image.width(); u += stride) ++count_[row[u]];
+    for (int u = 0; u < image.width(); u += stride) greys.add(turn++, row[u]);
   }
+  count_ = greys.counts();
   few_ = std::max(1, static_cast<int>(std::min(1e9, 0.25 * mark / (stride * stride))));
 }
 

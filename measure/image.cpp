@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "measure/tally.h"
+
 namespace zeropose {
 namespace {
 
@@ -32,9 +34,10 @@ int take_bends(const ImageView& image, const PixelWindow& window, const Take& ta
 }
 
 int median_bend_of_bytes(const ImageView& image, const PixelWindow& window) {
-  std::array<int, 511> histogram{};
-  const int count =
-      take_bends<std::uint8_t>(image, window, [&](int bend) { ++histogram[static_cast<std::size_t>(bend)]; });
+  Tally<511> bends;
+  std::size_t turn = 0;
+  const int count = take_bends<std::uint8_t>(image, window, [&](int bend) { bends.add(turn++, bend); });
+  const auto histogram = bends.counts();
   int middle = 0;
   for (int sum = histogram[0]; 2 * sum < count && middle < 510;) sum += histogram[std::size_t(++middle)];
   return middle;

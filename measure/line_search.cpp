@@ -19,6 +19,7 @@ constexpr double member_px = 2.5, member_rad = 0.4;
 constexpr float member_cosine = 0.921F;
 constexpr double side_px = 2.5;     // where the grey levels beside an edge are taken
 constexpr double least_points = 6;  // of a line
+constexpr double piece_gap_px = 3;  // points beside a piece that still are its own
 constexpr double largest_tolerance_rad = 3.1;
 
 // Votes by direction of the normal and offset from the window's middle.
@@ -154,13 +155,26 @@ double contrast_of(const Profile& profile, const std::vector<SlopePoint>& points
   return values[values.size() / 2];
 }
 
-// Fills in what is seen of the line; false: nothing of it.
-bool measure_extent(const GreyWindow& window, const std::vector<SlopePoint>& points, EdgeLine& line) {
+bool covers(const EdgeLine& line, const Eigen::Vector2d& at) {
+  const double t = line.along().dot(at);
+  return t > line.t0 - piece_gap_px && t < line.t1 + piece_gap_px;
+}
+
+// Fills in what is seen of the line beside the pieces that are known; false: nothing of it.
+bool measure_extent(const GreyWindow& window, const std::vector<SlopePoint>& points,
+                    const std::vector<EdgeLine>& known, EdgeLine& line) {
   const Profile profile = profile_of(window, line);
   line.contrast = contrast_of(profile, points, line);
   if (!(line.contrast > 0)) return false;
   std::vector<bool> seen;
-  for (const double c : profile.contrast) seen.push_back(c > 0.5 * line.contrast && c < 2 * line.contrast);
+  for (const double c : profile.contrast) {
+    const Eigen::Vector2d at = line.point(profile.first_t + double(seen.size()));
+    const bool taken = std::any_of(known.begin(), known.end(), [&](const EdgeLine& other) {
+      return std::abs(other.normal().dot(at) - other.offset_px) < member_px &&
+             other.normal().dot(line.normal()) > member_cosine && covers(other, at);
+    });
+    seen.push_back(c > 0.5 * line.contrast && c < 2 * line.contrast && !taken);
+  }
   const SeenRun run = longest_run(seen);
   if (run.last < run.first) return false;
   line.t0 = profile.first_t + run.first;
@@ -225,6 +239,7 @@ std::vector<EdgeLine> find_lines(const GreyWindow& window, const LineLimits& lim
     }
   }
   std::vector<EdgeLine> lines;
+  const std::vector<EdgeLine> none;
   for (std::size_t k = 0; k < 3 * limits.most && lines.size() < limits.most; ++k) {
     const VoteTable::Peak peak = table.highest();
     if (peak.votes < least_points * least_slope) break;
@@ -233,13 +248,15 @@ std::vector<EdgeLine> find_lines(const GreyWindow& window, const LineLimits& lim
     line.offset_px = peak.offset_px;
     const EdgeLine before = line;
     const bool refined = refine(left, member_px, line) && refine(left, 1.5, line) && refine(left, 1.5, line);
-    if (refined && wanted(line, limits) && measure_extent(window, left, line) &&
-        line.length() >= limits.min_length_px) {
-      lines.push_back(line);
-    }
+    const bool good = refined && wanted(line, limits) &&
+                      measure_extent(window, left, limits.all_pieces ? lines : none, line) &&
+                      line.length() >= limits.min_length_px;
+    if (good) lines.push_back(line);
     const Membership on_line(line, member_px), on_peak(before, 1);
-    const auto taken = std::stable_partition(left.begin(), left.end(),
-                                             [&](const SlopePoint& p) { return !on_line(p) && !on_peak(p); });
+    const bool leave_others = good && limits.all_pieces;
+    const auto taken = std::stable_partition(left.begin(), left.end(), [&](const SlopePoint& p) {
+      return (!on_line(p) && !on_peak(p)) || (leave_others && !covers(line, Eigen::Vector2d(p.x, p.y)));
+    });
     if (taken == left.end()) break;
     std::for_each(taken, left.end(), [&table](const SlopePoint& p) { table.add(p, -p.slope); });
     left.erase(taken, left.end());

@@ -29,6 +29,7 @@ struct LineLimits {
   double direction_rad = 0, tolerance_rad = 4;  // of the normal; pi or more: any
   double min_length_px = 6;
   std::size_t most = 12;
+  bool all_pieces = false;  // that lie on one straight line; else the longest of them
 };
 
 // The strongest first (votes weigh slope, so contrast and length both count); at most limits.most.

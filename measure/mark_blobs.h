@@ -34,9 +34,10 @@ class BlobFinder {
   const std::vector<Blob>& find(const SearchImage& image, int level, bool bright, const BlobLimits& limits);
 
  private:
-  struct Run {
-    int u0, u1, v;
-    int region;
+  // Rows v0..v1 that the level cuts alike; its runs follow on first_run.
+  struct Strip {
+    int v0, v1;
+    std::size_t first_run;
   };
   struct Region {
     int parent;
@@ -44,27 +45,36 @@ class BlobFinder {
     std::int64_t area;
     int blob;  // -1: not of interest
   };
+  // A run of a region of interest.
+  struct Piece {
+    int blob;
+    int from, past, v0, v1;  // columns from..past-1
+  };
   struct Moments {
     double n = 0, u = 0, v = 0, uu = 0, uv = 0, vv = 0, overlap = 0;
   };
 
   bool cut_into_runs(const SearchImage& image, int level, bool bright);
-  void sort_tiles(const SearchImage& image, int tile_row, int level, bool bright);
-  void runs_of_row(int v, int width);
+  bool sort_tiles(const SearchImage& image, int tile_row, int level, bool bright);
+  void runs_of_row(const std::uint8_t* greys, int width, int level, bool bright);
   void join_runs();
+  int join_with_above(std::size_t run, std::size_t& above, std::size_t above_end);
   int root_of(int region);
   void select(const SearchImage& image, const BlobLimits& limits);
   void measure_moments();
   void measure_misfit();
 
-  std::vector<std::uint64_t> uniform_, bits_;  // one bit per pixel of a row: in the region or not
-  std::vector<int> mixed_;                     // tiles that the level crosses
-  std::vector<Run> runs_;
-  std::vector<std::size_t> row_starts_;
+  std::vector<std::uint64_t>
+      uniform_;  // one bit per pixel of a row: in the region, where its tile is of one kind
+  std::vector<std::uint32_t> mixed_;  // of every word's tiles those that the level crosses, as bits
+  std::vector<int> turns_;            // columns where a run starts and where it has ended, by turns
+  std::size_t turn_count_ = 0;
+  std::vector<Strip> strips_;  // and one behind the last
+  std::vector<int> region_of_run_;
   std::vector<Region> regions_;
   std::vector<Blob> blobs_;
+  std::vector<Piece> pieces_;
   std::vector<Moments> moments_;
-  std::size_t most_runs_ = 0;
 };
 
 }  // namespace zeropose

@@ -9,9 +9,8 @@
 namespace zeropose {
 namespace {
 
-constexpr double coarsest_step = 18, finest_step = 3;  // grey levels
-constexpr double shift_share = 1.0 / 6;                // of the step: how far a level may give way to noise
-constexpr double size_margin_px = 2;                   // the region at one level against the fitted outline
+constexpr double finest_step = 3;     // grey levels
+constexpr double size_margin_px = 2;  // the region at one level against the fitted outline
 
 constexpr std::size_t most_groups = 2000;  // things kept apart
 constexpr double flatten_share = 0.5;      // of the least contrast: what the light may fall off over a mark
@@ -23,13 +22,31 @@ int reduction_for(const MarkSearch& search) {
   return reduction;
 }
 
+template <typename Pixel>
 double sample(const ImageView& image, const Eigen::Vector2d& at) {
   const double u = std::clamp(at.x(), 0.0, image.width_px - 1.001);
   const double v = std::clamp(at.y(), 0.0, image.height_px - 1.001);
   const int iu = static_cast<int>(u), iv = static_cast<int>(v);
   const double fu = u - iu, fv = v - iv;
-  return (1 - fv) * ((1 - fu) * image.grey_at(iu, iv) + fu * image.grey_at(iu + 1, iv)) +
-         fv * ((1 - fu) * image.grey_at(iu, iv + 1) + fu * image.grey_at(iu + 1, iv + 1));
+  const Pixel *above = image.row<Pixel>(iv) + iu, *below = image.row<Pixel>(iv + 1) + iu;
+  return image.grey_per_count() *
+         ((1 - fv) * ((1 - fu) * above[0] + fu * above[1]) + fv * ((1 - fu) * below[0] + fu * below[1]));
+}
+
+// Directions all round.
+constexpr std::size_t directions = 32;
+using Circle = std::array<Eigen::Vector2d, directions>;
+
+const Circle& unit_circle() {
+  static const Circle circle = [] {
+    Circle points;
+    for (std::size_t k = 0; k < directions; ++k) {
+      const double angle = 2 * std::numbers::pi * double(k) / directions;
+      points[k] = {std::cos(angle), std::sin(angle)};
+    }
+    return points;
+  }();
+  return circle;
 }
 
 // Grey levels on both sides of an outline.
@@ -38,20 +55,19 @@ struct Sides {
   double sound_share = 0;  // of the directions with at least half of the median contrast, in its sense
 };
 
+template <typename Pixel>
 Sides sides_of(const ImageView& image, const Eigen::Vector2d& centre_px, const Eigen::Matrix2d& shape_px2) {
-  constexpr std::size_t directions = 32;
   const HalfAxes axes = half_axes(shape_px2);
   const Eigen::Vector2d major(std::cos(axes.angle_rad), std::sin(axes.angle_rad));
   const Eigen::Vector2d minor(-major.y(), major.x());
   const double inwards = std::min(2.5, 0.6 * axes.minor_px);
   std::array<double, directions> in{}, out{};
   for (std::size_t k = 0; k < directions; ++k) {
-    const double angle = 2 * std::numbers::pi * double(k) / directions, c = std::cos(angle),
-                 s = std::sin(angle);
+    const double c = unit_circle()[k].x(), s = unit_circle()[k].y();
     const Eigen::Vector2d on = axes.major_px * c * major + axes.minor_px * s * minor;
     const Eigen::Vector2d normal = (axes.minor_px * c * major + axes.major_px * s * minor).normalized();
-    in[k] = sample(image, centre_px + on - inwards * normal);
-    out[k] = sample(image, centre_px + on + 2.5 * normal);
+    in[k] = sample<Pixel>(image, centre_px + on - inwards * normal);
+    out[k] = sample<Pixel>(image, centre_px + on + 2.5 * normal);
   }
   const auto median = [](std::array<double, directions> values) {
     std::nth_element(values.begin(), values.begin() + directions / 2, values.end());
@@ -65,34 +81,22 @@ Sides sides_of(const ImageView& image, const Eigen::Vector2d& centre_px, const E
   return sides;
 }
 
-// Reasons by how near to a found mark they are.
-int telling(MarkStatus status) {
-  switch (status) {
-    case MarkStatus::too_small:
-      return 1;
-    case MarkStatus::cut_off:
-      return 2;
-    case MarkStatus::low_contrast:
-      return 3;
-    default:
-      return 0;
-  }
-}
-
 }  // namespace
 
 CandidateSearch CandidateFinder::first(const ImageView& image, const PixelWindow& window,
-                                       const MarkSearch& search) {
+                                       const MarkSearch& search, const LevelPlan& plan) {
   reduced_.prepare(image, window, reduction_for(search));
-  return start(image, search);
+  return start(image, search, plan);
 }
 
-std::optional<CandidateSearch> CandidateFinder::flattened(const ImageView& image, const MarkSearch& search) {
+std::optional<CandidateSearch> CandidateFinder::flattened(const ImageView& image, const MarkSearch& search,
+                                                          const LevelPlan& plan) {
   if (!reduced_.flatten(flatten_share * search.min_contrast, search.max_diameter_px)) return std::nullopt;
-  return start(image, search);
+  return start(image, search, plan);
 }
 
-CandidateSearch CandidateFinder::start(const ImageView& image, const MarkSearch& search) {
+CandidateSearch CandidateFinder::start(const ImageView& image, const MarkSearch& search,
+                                       const LevelPlan& plan) {
   groups_.clear();
   crowded_ = false;
   reason_ = MarkStatus::no_candidate;
@@ -101,7 +105,8 @@ CandidateSearch CandidateFinder::start(const ImageView& image, const MarkSearch&
   high_ = histogram_.high();
   step_ = 0;
   if (high_ - low_ < search.min_contrast) return {{}, MarkStatus::low_contrast, false, 0};
-  step_ = (high_ - low_) / std::ceil((high_ - low_) / coarsest_step);
+  const double wanted = std::ceil((high_ - low_) / std::max(finest_step, plan.widest_step_grey));
+  step_ = (high_ - low_) / std::min(wanted, double(plan.most_levels));
   return look(image, search, low_ + step_ / 2);
 }
 
@@ -117,13 +122,13 @@ CandidateSearch CandidateFinder::look(const ImageView& image, const MarkSearch& 
     look_at_level(search, histogram_.quietest_near(level, room));
   CandidateSearch result = judge(image, search);
   result.crowded = crowded_;
-  result.step_grey = step_ + 2 * room;
+  result.step_grey = step_grey_by_step * step_;
   return result;
 }
 
 void CandidateFinder::look_at_level(const MarkSearch& search, int level) {
-  const auto suggest = [this](MarkStatus status) {
-    if (telling(status) > telling(reason_)) reason_ = status;
+  const auto suggest = [this](MarkStatus status) {  // a small one says less than one that is cut
+    if (status == MarkStatus::cut_off || reason_ == MarkStatus::no_candidate) reason_ = status;
   };
   const double scale = reduced_.reduction();  // all below in pixels of the image
   const double largest = search.max_diameter_px + size_margin_px * scale;
@@ -170,16 +175,21 @@ void CandidateFinder::add(const Sighting& sighting) {
 CandidateSearch CandidateFinder::judge(const ImageView& image, const MarkSearch& search) {
   CandidateSearch result{{}, reason_, false, 0};
   const double sign = search.bright ? -1 : 1;
+  const auto sides_at = [&image](const Sighting& seen) {
+    return image.two_bytes() ? sides_of<std::uint16_t>(image, seen.centre_px, seen.shape_px2)
+                             : sides_of<std::uint8_t>(image, seen.centre_px, seen.shape_px2);
+  };
   for (Group& group : groups_) {
     std::sort(group.begin(), group.end(),
               [](const Sighting& a, const Sighting& b) { return a.level < b.level; });
     const Sighting* best = &group[group.size() / 2];
-    Sides sides = sides_of(image, best->centre_px, best->shape_px2);
+    Sides sides = sides_at(*best);
     const double middle = 0.5 * (sides.inside + sides.outside);
+    const Sighting* const first = best;
     for (const Sighting& other : group) {
       if (std::abs(other.level - middle) < std::abs(best->level - middle)) best = &other;
     }
-    sides = sides_of(image, best->centre_px, best->shape_px2);
+    if (best != first) sides = sides_at(*best);
     const double contrast = sign * (sides.outside - sides.inside);
     if (!(contrast > 0) || sides.sound_share < 0.85) continue;
     if (contrast < search.min_contrast) {

@@ -26,18 +26,29 @@ struct CandidateSearch {
   double step_grey = 0;                          // widest: things of less contrast may have been overlooked
 };
 
+// At which grey levels to look first.
+struct LevelPlan {
+  double widest_step_grey = 18;
+  int most_levels = 255;  // further apart where the range asks for more
+};
+
 // Looks at grey levels step by step through the range of a window.
 class CandidateFinder {
  public:
-  // At a coarse step. Precondition: the window lies in the image.
-  CandidateSearch first(const ImageView& image, const PixelWindow& window, const MarkSearch& search);
+  static constexpr double shift_share = 1.0 / 6;  // of the step: how far a level may give way to noise
+  static constexpr double step_grey_by_step = 1 + 2 * shift_share;
+
+  // Precondition: the window lies in the image.
+  CandidateSearch first(const ImageView& image, const PixelWindow& window, const MarkSearch& search,
+                        const LevelPlan& plan = {});
 
   // At half the step of the call before, in the same window; all that was seen up to then. Nothing when that
   // would be finer than makes sense.
   std::optional<CandidateSearch> finer(const ImageView& image, const MarkSearch& search);
 
   // As first() in the same window, without the light's falling off. Nothing when it does not fall off.
-  std::optional<CandidateSearch> flattened(const ImageView& image, const MarkSearch& search);
+  std::optional<CandidateSearch> flattened(const ImageView& image, const MarkSearch& search,
+                                           const LevelPlan& plan = {});
 
  private:
   struct Sighting {
@@ -48,7 +59,7 @@ class CandidateFinder {
   };
   using Group = std::vector<Sighting>;
 
-  CandidateSearch start(const ImageView& image, const MarkSearch& search);
+  CandidateSearch start(const ImageView& image, const MarkSearch& search, const LevelPlan& plan);
   CandidateSearch look(const ImageView& image, const MarkSearch& search, double first_level);
   void look_at_level(const MarkSearch& search, int level);
   void add(const Sighting& sighting);

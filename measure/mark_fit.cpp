@@ -4,22 +4,27 @@
 #include <cmath>
 
 #include "measure/covered_fit.h"
+#include "measure/mark_verdict.h"
 
 namespace zeropose {
 namespace {
 
-constexpr double noise_sigmas = 4;        // how far two variances of the same noise may differ
-constexpr double rough_px = 0.15;         // what the outline of a real mark may deviate from an ellipse, rms
-constexpr double most_noise_share = 0.3;  // of the contrast
-constexpr double saturated_share = 0.02;  // of the pixels across the outline
-constexpr double plain_model_share = 0.04;  // what plain optics leave
-constexpr double clear_contrast = 20;       // in units of the noise: shows well what is no ellipse
+constexpr double clear_contrast = 20;  // in units of the noise: shows well what is no ellipse
 
 bool band_in_image(const ImageView& image, const EllipseStart& start) {
   const double u = std::sqrt(start.shape_px2(0, 0)) + start.band_px + 0.5;
   const double v = std::sqrt(start.shape_px2(1, 1)) + start.band_px + 0.5;
   return start.centre_px.x() - u >= 0 && start.centre_px.x() + u <= image.width_px - 1 &&
          start.centre_px.y() - v >= 0 && start.centre_px.y() + v <= image.height_px - 1;
+}
+
+FitEvidence evidence_of(const EllipseFit& fit) {
+  return {std::abs(fit.background_grey - fit.mark_grey),
+          fit.edge_rms,
+          fit.flat_rms,
+          fit.outline_px,
+          fit.outline_noise_px,
+          std::sqrt(2 / fit.edge_count + 2 / std::max(1.0, fit.flat_count))};
 }
 
 MarkFinding finding_of(const EllipseFit& fit) {
@@ -34,21 +39,12 @@ MarkFinding finding_of(const EllipseFit& fit) {
   finding.contrast = std::abs(fit.background_grey - fit.mark_grey);
   finding.blur_px = fit.blur_px;
   finding.outline_share = 1;
-  const double noise = fit.flat_rms > 0 ? fit.flat_rms : 0.02 * finding.contrast;
-  const double excess = std::max(0.0, fit.edge_rms * fit.edge_rms - noise * noise);
-  const double allowed = plain_model_share * finding.contrast;
-  finding.quality = 1 / (1 + excess / (allowed * allowed));
+  finding.quality = quality_of(evidence_of(fit));
   return finding;
 }
 
-// Residuals across the outline: noise as in the flat rings, and a small share of the contrast.
-bool explains(const EllipseFit& fit, const MarkFinding& finding, const FitTolerance& tolerance) {
-  const double noise = std::min({fit.flat_rms, most_noise_share * finding.contrast, tolerance.noise_grey});
-  const double spread = std::sqrt(2 / fit.edge_count + 2 / std::max(1.0, fit.flat_count));
-  const double model = tolerance.model_share * finding.contrast;
-  const double allowed2 = noise * noise * (1 + noise_sigmas * spread) + model * model;
-  const double outline2 = 2.5 * fit.outline_noise_px * fit.outline_noise_px + rough_px * rough_px;
-  return fit.edge_rms * fit.edge_rms < allowed2 && fit.outline_px * fit.outline_px < outline2;
+bool explains(const EllipseFit& fit, const FitTolerance& tolerance) {
+  return pixels_agree(evidence_of(fit), tolerance.model_share, tolerance.noise_grey);
 }
 
 // The outline is where the search saw it.
@@ -85,8 +81,7 @@ MarkFinding fit_mark(const ImageView& image, const MarkSearch& search, const Ell
   const EllipseFit fit = fit_ellipse(image, start, workspace);
   if (!fit.converged) return failed(MarkStatus::not_converged);
   MarkFinding finding = finding_of(fit);
-  finding.status =
-      status_of(fit, finding, search, explains(fit, finding, tolerance) && in_place(fit, start, 0.05));
+  finding.status = status_of(fit, finding, search, explains(fit, tolerance) && in_place(fit, start, 0.05));
   return finding;
 }
 
@@ -101,7 +96,7 @@ MarkFinding fit_covered_mark(const ImageView& image, const MarkSearch& search, c
   const bool clear = finding.contrast > clear_contrast * covered.noise_grey;
   const bool explained = covered.outline_share >= (clear ? 0.5 : 0.6) && covered.gaps <= (clear ? 8 : 4) &&
                          covered.waves_px < rough_px && covered.noise_grey < tolerance.noise_grey &&
-                         explains(covered.fit, finding, tolerance) && in_place(covered.fit, start, 0.2);
+                         explains(covered.fit, tolerance) && in_place(covered.fit, start, 0.2);
   finding.status = status_of(covered.fit, finding, search, explained);
   return finding;
 }

@@ -5,6 +5,7 @@
 
 #include "measure/disc_search.h"
 #include "measure/edge_marks.h"
+#include "measure/mark_verdict.h"
 #include "measure/pattern_search.h"
 #include "measure/ring_search.h"
 
@@ -21,10 +22,7 @@ bool shares_descend(const std::vector<double>& shares) {
 }
 
 bool makes_sense(const MarkSearch& s) {
-  return s.expected_px.allFinite() && s.half_window_px.allFinite() && (s.half_window_px.array() >= 0).all() &&
-         std::isfinite(s.max_diameter_px) && s.min_diameter_px > 0 &&
-         s.min_diameter_px <= s.max_diameter_px && s.min_axis_ratio > 0 && s.min_axis_ratio <= 1 &&
-         s.min_contrast > 0 && s.max_blur_px > 0 &&
+  return place_makes_sense(s) && sizes_make_sense(s) &&
          (s.kind != MarkKind::ring || shares_descend(s.inner_shares));
 }
 
@@ -38,12 +36,6 @@ MarkStatus first_look(const ImageView& image, const MarkSearch& search) {
 // -1 for what is no number.
 int pixel_of(double place, int size) {
   return std::isnan(place) ? -1 : static_cast<int>(std::clamp(place, -1.0, double(size)));
-}
-
-MarkFinding with_status(MarkStatus status) {
-  MarkFinding finding;
-  finding.status = status;
-  return finding;
 }
 
 MarkSight sight_of_one(const MarkFinding& finding) {
@@ -66,7 +58,7 @@ MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wan
   // The others look by themselves whether a search makes sense.
   if (is_round(search.kind))
     if (const MarkStatus status = first_look(image, search); status != MarkStatus::found)
-      return {{}, with_status(status), false};
+      return sight_without(status);
   const PixelWindow window = is_round(search.kind) ? window_of(image, search) : PixelWindow{};
   switch (search.kind) {
     case MarkKind::disc:
@@ -75,13 +67,13 @@ MarkSight look_for(const ImageView& image, const MarkSearch& search, HowMany wan
     case MarkKind::ring:
       return look_for_rings(image, window, search, workspace);
     case MarkKind::slot:
-      return sight_of_one(find_slot(image, search));
+      return look_for_slots(image, search, wanted);
     case MarkKind::cross:
-      return sight_of_one(find_cross(image, search));
+      return look_for_crosses(image, search, wanted);
     case MarkKind::corner:
-      return sight_of_one(find_corner(image, search));
+      return look_for_corners(image, search, wanted);
     case MarkKind::edge:
-      return sight_of_one(find_edge(image, search));
+      return look_for_edges(image, search, wanted);
     case MarkKind::pattern:
       return sight_of_one(find_pattern(image, search));
   }

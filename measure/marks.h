@@ -94,8 +94,8 @@ std::vector<MarkFinding> find_marks(const ImageView& image, std::span<const Mark
 
 // All things in a window that pass for the mark, the highest contrast first: where several are wanted, or the
 // geometry of several marks is to choose. nearest: what came nearest where there is none.
-// Slots, crosses, corners, edges and patterns: at most the one that find_marks() finds. crowded: there are
-// more than the `most` of highest contrast that were looked at.
+// Patterns: at most the one that find_marks() finds. crowded: there are more than the `most` of highest
+// contrast that were looked at.
 struct AllMarks {
   std::vector<MarkFinding> found;
   MarkFinding nearest;

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "measure/mark_verdict.h"
 #include "measure/pattern_fit.h"
 #include "measure/pattern_peaks.h"
 
@@ -21,7 +22,6 @@ constexpr double worth_following = 0.5;                // of the best peak's cor
 constexpr double rival_promising = 0.75, alike = 0.6;  // correlations: to go on with; of something like it
 constexpr double much_alike = 0.7;  // what stands out of the window must be, to be called the pattern
 constexpr double least_correlation = 0.85, least_share = 0.7;
-constexpr double saturated_share = 0.02;
 constexpr double stands_out_px = 1.5;
 constexpr double scale_range = 0.12, least_squeeze = 0.85, turn_slack_rad = 0.02;
 constexpr double blurred_px2 = 0.5;
@@ -41,9 +41,7 @@ bool usable(const Pattern* pattern) {
 }
 
 bool makes_sense(const MarkSearch& s) {
-  return usable(s.pattern) && s.expected_px.allFinite() && s.half_window_px.allFinite() &&
-         (s.half_window_px.array() >= 0).all() && std::isfinite(s.direction_rad) &&
-         s.direction_tolerance_rad >= 0 && s.min_contrast > 0 && s.max_blur_px > 0;
+  return usable(s.pattern) && place_makes_sense(s) && directions_make_sense(s);
 }
 
 double tolerance_of(const MarkSearch& search) {
@@ -210,8 +208,8 @@ MarkFinding PatternSearcher::measured(const PatternCandidate& candidate, const P
   return finding;
 }
 
-// How near to a found one a failed one came.
-int telling(const MarkFinding& finding) {
+// How near to a found one a failed one came: what was measured at all says more than a limit of size or turn.
+int nearness(const MarkFinding& finding) {
   switch (finding.status) {
     case MarkStatus::no_candidate:
       return 1;
@@ -234,8 +232,8 @@ bool rivals(const MarkFinding& a, const MarkFinding& b) {
 bool better(const MarkFinding& a, const MarkFinding& b) {
   const bool found_a = a.status == MarkStatus::found, found_b = b.status == MarkStatus::found;
   if (found_a != found_b) return found_a;
-  if (found_a || telling(a) == telling(b)) return a.quality > b.quality;
-  return telling(a) > telling(b);
+  if (found_a || nearness(a) == nearness(b)) return a.quality > b.quality;
+  return nearness(a) > nearness(b);
 }
 
 MarkFinding PatternSearcher::run() {

@@ -31,6 +31,16 @@ void widen(const std::uint8_t* __restrict greys, int width, std::uint8_t* __rest
   }
 }
 
+// Extremes of sixteen neighbours.
+template <typename Choose>
+std::uint8_t fold(const std::uint8_t* greys, const Choose& choose) {
+  std::array<std::uint8_t, SearchImage::tile_width> best;
+  std::copy_n(greys, best.size(), best.begin());
+  for (std::size_t n = best.size() / 2; n > 0; n /= 2)
+    for (std::size_t i = 0; i < n; ++i) best[i] = choose(best[i], best[i + n]);
+  return best[0];
+}
+
 // Second order in x and y, both scaled to about -1..1.
 using Surface = Eigen::Matrix<double, 6, 1>;
 
@@ -160,9 +170,9 @@ void SearchImage::measure_tiles() {
     for (int v = from + 1; v < to; ++v) widen(row(v), stride_, lows_.data(), highs_.data());
     TileRange* tiles = tiles_.data() + std::ptrdiff_t{tile_row} * tile_columns();
     for (int column = 0; column < tile_columns(); ++column) {
-      const auto first = std::ptrdiff_t{column} * tile_width;
-      tiles[column] = {*std::min_element(lows_.begin() + first, lows_.begin() + first + tile_width),
-                       *std::max_element(highs_.begin() + first, highs_.begin() + first + tile_width)};
+      const auto first = static_cast<std::size_t>(column) * tile_width;
+      tiles[column] = {fold(&lows_[first], [](std::uint8_t a, std::uint8_t b) { return std::min(a, b); }),
+                       fold(&highs_[first], [](std::uint8_t a, std::uint8_t b) { return std::max(a, b); })};
     }
   }
 }

@@ -16,7 +16,7 @@ namespace {
 constexpr double pi = std::numbers::pi;
 constexpr int levels = 12;             // that a window's range is looked at
 constexpr double size_margin_px = 2;   // the region at one level against the fitted outline
-constexpr std::size_t most_slots = 6;  // fits per window
+constexpr std::size_t most_slots = 6;  // fits per window where one is wanted
 constexpr double most_skew = 0.75;     // cosine of the angle between the slot's axes
 constexpr double most_squeeze = 2.2;   // of a cap, seen obliquely; flatter ones belong to a rectangle
 constexpr double shortest_px = 1;      // of half the straight edges: less is an ellipse
@@ -98,7 +98,7 @@ class SlotFinder {
   SlotFinder(const GreyWindow& window, const MarkSearch& search) : window_(window), search_(search) {}
 
   // The regions at several grey levels, each thing once: at the level nearest to its middle grey.
-  SlotSearch find();
+  SlotSearch find(HowMany wanted);
 
  private:
   void look_at_blob(const Blob& blob, double level);
@@ -155,7 +155,7 @@ void SlotFinder::add(const SlotStart& slot) {
   found_.slots.push_back(slot);
 }
 
-SlotSearch SlotFinder::find() {
+SlotSearch SlotFinder::find(HowMany wanted) {
   const ByteWindow bytes = bytes_of(window_);
   const auto [low, high] = std::minmax_element(bytes.grey.begin(), bytes.grey.end());
   const BlobLimits limits{std::max(4.0, 0.3 * search_.min_diameter_px),
@@ -172,7 +172,7 @@ SlotSearch SlotFinder::find() {
   }
   std::stable_sort(found_.slots.begin(), found_.slots.end(),
                    [](const SlotStart& a, const SlotStart& b) { return a.contrast > b.contrast; });
-  found_.slots.resize(std::min(most_slots, found_.slots.size()));
+  found_.slots.resize(std::min(wanted.one() ? most_slots : wanted.most, found_.slots.size()));
   return found_;
 }
 
@@ -263,20 +263,18 @@ JudgedMark judged_slot(const GreyWindow& window, const MarkSearch& search, const
 
 }  // namespace
 
-MarkFinding find_slot(const ImageView& image, const MarkSearch& search) {
+MarkSight look_for_slots(const ImageView& image, const MarkSearch& search, HowMany wanted) {
   const OpenedWindow opened = open_window(image, search, true);
-  MarkFinding none;
-  none.status = opened.status;
-  if (opened.status != MarkStatus::found) return none;
-  const SlotSearch seen = SlotFinder(opened.greys, search).find();
+  if (opened.status != MarkStatus::found) return sight_without(opened.status);
+  const SlotSearch seen = SlotFinder(opened.greys, search).find(wanted);
   std::vector<JudgedMark> marks;
   ContourWorkspace workspace;
   for (const SlotStart& slot : seen.slots) {
     marks.push_back(judged_slot(opened.greys, search, slot, workspace));
   }
-  MarkFinding finding = chosen_mark(marks, opened.greys, search);
-  if (marks.empty() && finding.status == MarkStatus::no_candidate) finding.status = seen.reason;
-  return finding;
+  MarkSight sight = sight_of(marks, opened.greys, search, wanted);
+  if (marks.empty() && sight.nearest.status == MarkStatus::no_candidate) sight.nearest.status = seen.reason;
+  return sight;
 }
 
 }  // namespace zeropose

@@ -69,22 +69,30 @@ cv::Mat patch_of(const Scene& scene, const Pixels& taught) {
   return mat_of(taught)(cv::Rect(w.u0, w.v0, scene.patch_px, scene.patch_px));
 }
 
-// Place of the patch's middle by ECC, from the given place.
-Vector2d ecc(const cv::Mat& patch, const cv::Mat& image, const Vector2d& start, double epsilon = 1e-5) {
+struct EccEnd {
+  Vector2d place_px = Vector2d::Constant(1e3);  // of the patch's middle
+  double correlation = 0;                       // what it maximises, as it was before the last step
+};
+
+// From the given place, until the correlation rises by less than epsilon or for so many steps.
+EccEnd ecc(const cv::Mat& patch, const cv::Mat& image, const Vector2d& start, double epsilon = 1e-5,
+           int steps = 50) {
   const double half = 0.5 * (patch.cols - 1);
   cv::Mat warp = (cv::Mat_<float>(2, 3) << 1, 0, float(start.x() - half), 0, 1, float(start.y() - half));
+  EccEnd end;
   try {
-    cv::findTransformECC(patch, image, warp, cv::MOTION_AFFINE,
-                         cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 50, epsilon),
-                         cv::noArray(), 1);
+    end.correlation = cv::findTransformECC(
+        patch, image, warp, cv::MOTION_AFFINE,
+        cv::TermCriteria(cv::TermCriteria::COUNT + cv::TermCriteria::EPS, steps, epsilon), cv::noArray(), 1);
   } catch (const cv::Exception&) {
-    return Vector2d::Constant(1e3);
+    return end;
   }
   const auto at = [&](int row) {
     return double{warp.at<float>(row, 0)} * half + double{warp.at<float>(row, 1)} * half +
            double{warp.at<float>(row, 2)};
   };
-  return {at(0), at(1)};
+  end.place_px = {at(0), at(1)};
+  return end;
 }
 
 double vertex(double before, double at, double after) {
@@ -146,11 +154,17 @@ void ecc_affine(benchmark::State& state) {
   const Exposed e = exposed(static_cast<int>(state.range(0)), 80, 1);
   const Vector2d start = e.scene.truth() + start_off;
   const cv::Mat patch = patch_of(e.scene, e.taught), image = mat_of(e.seen);
-  Vector2d place;
-  for (auto _ : state) benchmark::DoNotOptimize(place = ecc(patch, image, start));
-  state.counters["error_px"] = (place - e.scene.truth()).norm();
+  const double epsilon = std::pow(10.0, -double(state.range(1)));
+  EccEnd end;
+  for (auto _ : state) benchmark::DoNotOptimize(end = ecc(patch, image, start, epsilon));
+  state.counters["error_px"] = (end.place_px - e.scene.truth()).norm();
+  // What its maximum would have been, and how far from there it stopped.
+  const EccEnd best = ecc(patch, image, start, 1e-15, 2000);
+  state.counters["short_of_end"] = best.correlation - end.correlation;
+  state.counters["from_end_px"] = (best.place_px - end.place_px).norm();
 }
-BENCHMARK(ecc_affine)->Arg(39)->Arg(41)->Arg(47)->Unit(benchmark::kMicrosecond);
+// The second number: it stops when its correlation rises by less than ten to the minus that.
+BENCHMARK(ecc_affine)->ArgsProduct({{39, 41, 47}, {5, 10}})->Unit(benchmark::kMicrosecond);
 
 void teaching(benchmark::State& state) {
   const Exposed e = exposed(41, 80, 1);
@@ -201,7 +215,7 @@ void match_template(benchmark::State& state, bool then_ecc) {
   Vector2d place;
   for (auto _ : state) {
     place = correlation_and_parabola(patch, window);
-    if (then_ecc) place = ecc(patch, window, place);
+    if (then_ecc) place = ecc(patch, window, place).place_px;
     benchmark::DoNotOptimize(place);
   }
   state.counters["error_px"] = (place + Vector2d(10, 10) - e.scene.truth()).norm();
@@ -270,7 +284,7 @@ void statistics(benchmark::State& state) {
         }
         if (draw >= 5) continue;
         const cv::Mat patch = patch_of(scene, taught), image = mat_of(seen);
-        by_ecc += (ecc(patch, image, truth + start_off) - truth).squaredNorm();
+        by_ecc += (ecc(patch, image, truth + start_off).place_px - truth).squaredNorm();
         by_parabola += (correlation_and_parabola(patch, image) - truth).squaredNorm();
         ++peers;
       }

@@ -18,14 +18,14 @@ def disc(u, v, at, radius):
     return step(radius - math.hypot(u - at[0], v - at[1]))
 
 
-def png(path, level, size=(160, 140), bits=8):
-    """A grey picture; level(u, v) of 0..255. 16 bit: 12 bits of them are used."""
+def png(path, level, size=(160, 140), bits=8, shift=0):
+    """A grey picture; level(u, v) of 0..255. 16 bit: 12 bits of them are used, shift bits from the lower end."""
     rows = b""
     for v in range(size[1]):
         rows += b"\0"
         for u in range(size[0]):
             grey = level(u, v)
-            rows += struct.pack(">B", round(grey)) if bits == 8 else struct.pack(">H", round(grey * 4095 / 255))
+            rows += struct.pack(">B", round(grey)) if bits == 8 else struct.pack(">H", round(grey * 4095 / 255) << shift)
 
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
@@ -61,6 +61,16 @@ class Find(Case):
             self.assertAlmostEqual(answer["marks"][0]["diameter_px"], 30, delta=0.3)
             self.assertEqual(sorted(set(answer["marks"][0]) & {"suu", "svv", "suv", "axis_ratio", "quality"}),
                              ["axis_ratio", "quality", "suu", "suv", "svv"])
+
+    def test_twelve_bits_at_either_end_of_sixteen_are_saturated_at_their_white(self):
+        for shift in (0, 4):
+            fine = lambda u, v: 250 - 150 * disc(u, v, (50.3, 60.7), 15)
+            status, answer, _ = self.find(fine, "--min-diameter", 20, bits=16, shift=shift)
+            self.assertEqual((status, len(answer["marks"])), (0, 1), answer)
+            self.assertAlmostEqual(answer["marks"][0]["contrast"], 150, delta=5)
+            white = lambda u, v: min(255, fine(u, v) + 40)
+            status, answer, _ = self.find(white, "--min-diameter", 20, bits=16, shift=shift)
+            self.assertEqual((status, answer["name"]), (1, "saturated"), answer)
 
     def test_a_window_and_an_overlay(self):
         status, answer, _ = self.find(two_discs, "--window", "80,50,60,60", "--min-diameter", 15, "--overlay",

@@ -1,7 +1,9 @@
 // Edges, corners, slots and crosses: every reason, what lies over and beside them, what must not be taken.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -71,6 +73,74 @@ void expect_status(const MarkFinding& finding, MarkStatus wanted,
 
 // Four and a half sigma of one or two coordinates: one in 10^4 or less.
 constexpr double most_sigmas = 4.5;
+
+// Two of a kind in one row, so that their edges lie on common lines.
+PolygonDrawing twice(const ShapeScene& scene) {
+  PolygonDrawing drawing = drawing_of(scene);
+  drawing.width_px = 2 * scene.side_px;
+  const auto first = drawing.polygons;
+  for (Polygon polygon : first) {
+    for (Vector2d& corner : polygon.corners_px) corner.x() += scene.side_px;
+    drawing.polygons.push_back(polygon);
+  }
+  return drawing;
+}
+
+MarkSearch search_in(const PolygonDrawing& drawing, MarkKind kind) {
+  MarkSearch search;
+  search.kind = kind;
+  search.expected_px = search.half_window_px = 0.5 * Vector2d(drawing.width_px - 1, drawing.height_px - 1);
+  search.min_diameter_px = 15;
+  search.max_diameter_px = 60;
+  search.min_axis_ratio = 0.1;
+  return search;
+}
+
+// Each of the places is found once within five sigma, and nothing else.
+void expect_places(const PolygonDrawing& drawing, MarkKind kind, const std::vector<Vector2d>& places) {
+  const std::vector<MarkFinding> found =
+      find_all_marks(pixels_of(drawing).view(), search_in(drawing, kind)).found;
+  EXPECT_EQ(found.size(), places.size()) << name_of(kind);
+  for (const Vector2d& place : places) {
+    const auto there = std::count_if(found.begin(), found.end(), [&](const MarkFinding& mark) {
+      const Vector2d off = mark.u_px - place;
+      return off.dot(mark.covariance_px2.inverse() * off) < 25;
+    });
+    EXPECT_EQ(there, 1) << name_of(kind) << ' ' << place.transpose();
+  }
+}
+
+TEST(ShapeLists, AllSlotsCrossesAndCornersOfAWindowAreListed) {
+  const Vector2d step(60, 0);
+  const ShapeScene slot = slot_scene(), cross{MarkKind::cross, {0.3, -0.2, 0, pi / 2, 4, 20, 20, 20, 20}, 60};
+  for (const ShapeScene& scene : {slot, cross})
+    expect_places(twice(scene), scene.kind, {scene.truth_px(), scene.truth_px() + step});
+  PolygonDrawing blocks = drawing_of(slot);
+  blocks.width_px = 120;
+  blocks.polygons = {block({30.2, 29.6}, 0, 18, 15, 60), block({90.2, 29.6}, 0, 18, 15, 60)};
+  std::vector<Vector2d> corners;
+  for (const Polygon& polygon : blocks.polygons)
+    corners.insert(corners.end(), polygon.corners_px.begin(), polygon.corners_px.end());
+  expect_places(blocks, MarkKind::corner, corners);
+}
+
+// Pieces of one line are one edge: their place along it is open.
+TEST(ShapeLists, AllEdgesOfAWindowAreListed) {
+  PolygonDrawing blocks = drawing_of(slot_scene());
+  blocks.width_px = 120;
+  blocks.polygons = {block({30.2, 29.6}, 0, 18, 15, 60), block({90.2, 29.6}, 0, 18, 15, 60)};
+  std::vector<double> upright, level;
+  for (const MarkFinding& edge :
+       find_all_marks(pixels_of(blocks).view(), search_in(blocks, MarkKind::edge)).found)
+    std::abs(std::cos(edge.direction_rad)) > 0.7 ? upright.push_back(edge.u_px.x())
+                                                 : level.push_back(edge.u_px.y());
+  std::sort(upright.begin(), upright.end());
+  std::sort(level.begin(), level.end());
+  // Five sigma of 0.01 px: noise 2, contrast 100, 24 px and more of an edge.
+  const std::vector<double> places_u{12.2, 48.2, 72.2, 108.2}, places_v{14.6, 44.6};
+  EXPECT_THAT(upright, ::testing::Pointwise(::testing::DoubleNear(0.05), places_u));
+  EXPECT_THAT(level, ::testing::Pointwise(::testing::DoubleNear(0.05), places_v));
+}
 
 TEST(ShapeReasons, SearchesThatMakeNoSense) {
   for (const ShapeScene& scene : every_scene) {

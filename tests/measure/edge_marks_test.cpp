@@ -158,7 +158,7 @@ TEST(ShapeEdge, TheCovarianceIsThatOfThePlaceAskedFor) {
     double squares = 0, variances = 0, found = 0;
     for (int draw = 0; draw < draws; ++draw) {
       const test::Pixels pixels = expose(picture, 2, random);
-      const MarkFinding finding = find_edge(pixels.view(), search);
+      const MarkFinding finding = find_marks(pixels.view(), {&search, 1}).front();
       if (finding.status != MarkStatus::found) continue;
       ++found;
       const Vector2d n = unit(finding.direction_rad);
@@ -185,7 +185,7 @@ TEST(ShapeGap, BothEdgesReachTheBound) {
     const Picture picture = paint(drawing_of(scene));
     bound += bound_of(scene, noise)(0, 0) / phases;
     for (int draw = 0; draw < draws; ++draw) {
-      const MarkFinding finding = find_edge(expose(picture, noise, random).view(), search);
+      const MarkFinding finding = find_marks(expose(picture, noise, random).view(), {&search, 1}).front();
       ASSERT_EQ(finding.status, MarkStatus::found) << name_of(finding.status) << ' ' << phase;
       const Vector2d off = finding.u_px - scene.truth_px();
       own += mahalanobis2(finding, search, off) / count;

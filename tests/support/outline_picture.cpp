@@ -269,10 +269,7 @@ Eigen::Matrix2d bound_of(const ShapeScene& scene, double noise_sigma) {
 }
 
 MarkFinding find_shape(const ImageView& image, const MarkSearch& search) {
-  if (search.kind == MarkKind::edge) return find_edge(image, search);
-  if (search.kind == MarkKind::corner) return find_corner(image, search);
-  if (search.kind == MarkKind::slot) return find_slot(image, search);
-  return find_cross(image, search);
+  return find_marks(image, {&search, 1}).front();
 }
 
 }  // namespace zeropose::test
