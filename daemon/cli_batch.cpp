@@ -18,6 +18,7 @@
 #include "daemon/cli_find.h"
 #include "daemon/cli_find_board.h"
 #include "daemon/cli_help.h"
+#include "daemon/cli_recalibrate.h"
 #include "measure/pose.h"
 
 namespace zeropose {
@@ -276,6 +277,7 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_convert(app, exit_status);
   add_find(app, exit_status);
   add_find_board(app, exit_status);
+  add_recalibrate(app, exit_status);
 }
 
 }  // namespace zeropose
