@@ -46,6 +46,10 @@ enum class Code : std::uint16_t {
   limit_rz = 506,
   value_out_of_range = 507,
 
+  camera_moved = 601,
+  reference_missing = 602,
+  camera_suspicious = 603,
+
   zero_missing = 701,
   zero_outdated = 702,
   storage_failed = 703,

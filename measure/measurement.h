@@ -8,6 +8,7 @@
 #include "measure/image.h"
 #include "measure/job.h"
 #include "measure/pose.h"
+#include "measure/references.h"
 #include "measure/zero.h"
 
 namespace zeropose {
@@ -24,9 +25,11 @@ struct Measurement {
   std::vector<MarkFinding> findings;      // one per view of the job
   std::vector<Observation> observations;  // the findings that were found
   PoseResult pose;
-  Pose X_O0O = Pose::Identity();    // meaningful only when code is ok
-  double largest_deviation_mm = 0;  // of the effective marks
-  double sigma_mm = 0;              // at the worst application point
+  Pose X_O0O = Pose::Identity();                // meaningful only when code is ok
+  double largest_deviation_mm = 0;              // of the effective marks
+  double sigma_mm = 0;                          // at the worst application point
+  std::vector<MarkFinding> reference_findings;  // one per view of the references
+  ReferenceCheck references;
 };
 
 // Where find_job_marks() looks: one search per view of the job (the snapshot draws them). The window reaches
@@ -47,11 +50,14 @@ struct MeasurementProblem {
   std::span<const CameraImage> images;
   const Job& job;
   std::span<const CalibratedCamera> cameras;
-  const Zero& zero;  // without compensations (default-made) it is missing
+  const Zero& zero;                                 // without compensations (default-made) it is missing
+  const References* references = nullptr;           // none: no camera is checked
+  const ReferenceTrend* reference_trend = nullptr;  // of the last measurement; none: a first one
 };
 
-// Marks, pose, security and limits in the order of M6; the first check that fails names the code. Marks are
-// searched around the zero pose and used where the zero measurement's compensation puts them.
+// Marks, references, pose, security and limits in the order of M6, but for the cameras: one that was moved is
+// the cause of all that follows, so it is asked about before the pose. The first check that fails names the
+// code. Marks are searched around the zero pose and used where the zero measurement's compensation puts them.
 Measurement measure(const MeasurementProblem& problem);
 
 }  // namespace zeropose
