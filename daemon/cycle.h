@@ -46,6 +46,7 @@ struct CameraStatus {
   CameraState state = CameraState::opening;
   std::string last_problem;
   CameraStatistics statistics;
+  CameraCheck check;  // its reference points, when they were last looked at
 };
 
 struct Status {
@@ -101,6 +102,8 @@ class Cycle {
   ZeroOutcome take_zero(TimePoint deadline);
   void keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome);
   Snapshot snapshot(std::size_t camera);
+  void remember(const ReferenceCheck& check);
+  void forget_checks();  // with a new zero or another job
   void load_zeros();
   std::optional<ZeroRecord> load_or_complain(const Job& job, Code& code) const;
 
@@ -113,6 +116,8 @@ class Cycle {
   std::size_t selected_ = 0;                      // job
   std::vector<std::optional<ZeroRecord>> zeros_;  // one per job
   std::vector<Code> zero_codes_;                  // why there is none
+  ReferenceTrend trend_;                          // since the zero of the selected job
+  std::vector<CameraCheck> checks_;               // by camera, when its references were last looked at
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

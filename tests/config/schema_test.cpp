@@ -42,6 +42,12 @@ Json full_example() {
   json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
   json["jobs"][0]["marks"][0]["kind"] = "dark_ring";
   json["jobs"][0]["marks"][0]["inner_radius_mm"] = 1;
+  json["reference_points"] =
+      Json::array({parsed(R"({"name": "r", "cameras": ["camera1"], "kind": "bright_ring", "radius_mm": 5,
+    "inner_radius_mm": 2, "position_mm": [-525, -751, 200], "normal": [0, -0.6, -0.8], "pixel": [100, 90],
+    "diameter_px": 30, "group": "plate"})")});
+  json["reference_check"] =
+      parsed(R"({"search_mm": 20, "sigma_px": 0.05, "tolerance_px": 0.1, "suspicious_blocks": true})");
   json["robots"][0]["require_command_crc"] = false;
   json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
   json["robots"][0]["allowed_readers"] = {"10.0.0.2"};
