@@ -98,7 +98,8 @@ void read_inner_radius(JsonObject& object, Mark& mark) {
   if (ring) mark.inner_radii_mm = {radius_mm};
 }
 
-NamedMark read_mark(JsonObject& object) {
+// What a mark and a reference point have in common; the inner radius is read after the radius.
+NamedMark read_look(JsonObject& object) {
   NamedMark named;
   Mark& mark = named.mark;
   std::size_t kind = 0;
@@ -108,10 +109,16 @@ NamedMark read_mark(JsonObject& object) {
     mark.kind = mark_kinds[kind / 2];
     mark.bright = kind % 2 == 1;
   }
-  object.read("position_mm", mark.p_O_mm, largest_mm);
   read_normal(object, mark.normal_O);
   object.read_optional("radius_mm", mark.radius_mm, NumberRange{0, 1000, true});
   read_inner_radius(object, mark);
+  return named;
+}
+
+NamedMark read_mark(JsonObject& object) {
+  NamedMark named = read_look(object);
+  Mark& mark = named.mark;
+  object.read("position_mm", mark.p_O_mm, largest_mm);
   object.read_optional("weight", mark.weight, NumberRange{0, 1});
   object.read_optional("tolerance_px", mark.tolerance_px, NumberRange{0, 1000, true});
   object.read_optional("tolerance_mm", mark.tolerance_mm, NumberRange{0, 1000, true});
@@ -144,9 +151,9 @@ ApplicationPoint read_application_point(JsonObject& object) {
   return point;
 }
 
-// Turns the names of a mark's cameras into views.
+// Turns the names of the cameras of the mark of this index into views.
 void add_views(JsonObject& object, const NamedMark& named, const std::vector<CameraOptions>& cameras,
-               Job& job) {
+               std::size_t index, std::vector<View>& views) {
   if (object.has("cameras") && named.cameras.empty())
     object.add_mistake("cameras", "no camera", "at least one name of a camera of this cell");
   for (std::size_t i = 0; i < named.cameras.size(); ++i) {
@@ -159,7 +166,7 @@ void add_views(JsonObject& object, const NamedMark& named, const std::vector<Cam
              named.cameras.begin() + static_cast<std::ptrdiff_t>(i))
       object.add_mistake(key, in_quotes(name) + " twice", "each camera once");
     else
-      job.views.push_back({static_cast<std::size_t>(camera - cameras.begin()), job.marks.size()});
+      views.push_back({static_cast<std::size_t>(camera - cameras.begin()), index});
   }
 }
 
@@ -174,7 +181,7 @@ Job read_job(JsonObject& object, const std::vector<CameraOptions>& cameras) {
   object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
   object.read_each("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
     const NamedMark named = read_mark(member);
-    add_views(member, named, cameras, job);
+    add_views(member, named, cameras, job.marks.size(), job.views);
     job.marks.push_back(named.mark);
   });
   object.read_each("application_points", 1, [&](JsonObject& member) {
@@ -183,6 +190,50 @@ Job read_job(JsonObject& object, const std::vector<CameraOptions>& cameras) {
   object.read("requirements", [&](JsonObject& member) { read_requirements(member, job.requirements); });
   object.read("limits", [&](JsonObject& member) { read_limits(member, job.requirements.limits); });
   return job;
+}
+
+// Coordinates in the world, else where its only camera saw it and how large.
+ReferencePoint read_reference_place(JsonObject& object, const NamedMark& named) {
+  ReferencePoint point;
+  point.mark = named.mark;
+  object.read_optional("group", point.group);
+  const bool known = object.read_optional("position_mm", point.mark.p_O_mm, largest_mm);
+  std::array<double, 2> taught_px{};
+  const bool taught = object.read_optional("pixel", std::span<double>(taught_px), 65535.0);
+  object.read_optional("diameter_px", point.taught_diameter_px, NumberRange{0, 65535, true});
+  if (known) {
+    if (!object.has("radius_mm"))
+      object.add_mistake("radius_mm", "a point without it", "the radius of the point, mm");
+    return point;
+  }
+  if (!object.has("position_mm") && !object.has("pixel"))
+    object.add_mistake("position_mm", "neither position_mm nor pixel",
+                       "coordinates in the world, or where the camera sees the point");
+  if (!taught) return point;
+  if (named.cameras.size() != 1)
+    object.add_mistake("cameras", std::to_string(named.cameras.size()) + " cameras",
+                       "the one camera that pixel belongs to");
+  if (!object.has("diameter_px"))
+    object.add_mistake("diameter_px", "a pixel without it", "the diameter of the point's image, px");
+  point.taught_px = Eigen::Vector2d(taught_px[0], taught_px[1]);
+  return point;
+}
+
+void read_reference_check(JsonObject& object, References& references) {
+  object.read_optional("search_mm", references.search_mm, NumberRange{0, 1000, true});
+  object.read_optional("sigma_px", references.sigma_px, NumberRange{0, 10});
+  object.read_optional("tolerance_px", references.tolerance_px, NumberRange{0, 1000});
+  object.read_optional("suspicious_blocks", references.suspicious_blocks);
+}
+
+void read_references(JsonObject& object, Cell& cell) {
+  object.read_each_optional("reference_points", [&](JsonObject& member) {
+    const NamedMark named = read_look(member);
+    add_views(member, named, cell.cameras, cell.references.points.size(), cell.references.views);
+    cell.references.points.push_back(read_reference_place(member, named));
+  });
+  object.read_optional("reference_check",
+                       [&](JsonObject& member) { read_reference_check(member, cell.references); });
 }
 
 void read_link(JsonObject& object, RobotOptions& robot) {
@@ -248,6 +299,7 @@ std::string read_cell(JsonObject& object, Cell& cell) {
                    [&](JsonObject& member) { cell.cameras.push_back(read_camera_options(member)); });
   object.read_each("jobs", 1,
                    [&](JsonObject& member) { cell.jobs.push_back(read_job(member, cell.cameras)); });
+  read_references(object, cell);
   object.read_each("robots", 0, [&](JsonObject& member) { cell.robots.push_back(read_robot(member)); });
   object.read_optional("timing", [&](JsonObject& member) { read_timing(member, cell); });
   return calibration;
@@ -288,6 +340,14 @@ void add_calibration(Cell& cell, const std::string& text, const std::string& nam
   cell.calibration_hash = short_hash(text);
 }
 
+// Points that are known by their pixel get a place on its line of sight; all must lie in the pictures.
+void place_references(Cell& cell, const std::string& name, std::vector<std::string>& mistakes) {
+  if (!mistakes.empty()) return;
+  JsonReading reading(name);
+  put_references_in_place(cell, reading);
+  append(mistakes, reading.mistakes());
+}
+
 }  // namespace
 
 Cell parse_cell(const CellText& text) {
@@ -295,6 +355,7 @@ Cell parse_cell(const CellText& text) {
   std::string calibration;
   Cell cell = read_cell_file(text.cell, text.cell_name, calibration, mistakes);
   add_calibration(cell, text.calibration, text.calibration_name, mistakes);
+  place_references(cell, text.cell_name, mistakes);
   if (!mistakes.empty()) throw ConfigError(std::move(mistakes));
   return cell;
 }
@@ -307,6 +368,7 @@ Cell load_cell(const std::filesystem::path& path) {
     try {
       const std::filesystem::path file = path.parent_path() / calibration;
       add_calibration(cell, read_file(file), file.string(), mistakes);
+      place_references(cell, path.string(), mistakes);
     } catch (const ConfigError& error) {
       append(mistakes, error.mistakes());
     }

@@ -14,6 +14,7 @@
 #include "drivers/camera.h"
 #include "measure/correction.h"
 #include "measure/job.h"
+#include "measure/references.h"
 #include "protocol/conventions.h"
 
 namespace zeropose {
@@ -40,6 +41,7 @@ struct Cell {
   std::vector<CameraOptions> cameras;
   std::vector<CalibratedCamera> calibration;  // same order as cameras
   std::vector<Job> jobs;
+  References references;  // without points: no camera is checked
   std::vector<RobotOptions> robots;
   std::chrono::milliseconds deadline{500};  // command to answer, including the grab
   int zero_frames = 10;                     // averaged for a zero measurement

@@ -145,10 +145,40 @@ std::string size_text(int width_px, int height_px) {
 void check_cell(const Cell& cell, JsonReading& reading) {
   check_cameras(cell, reading);
   check_jobs(cell, reading);
+  check_unique(
+      cell.references.points, "reference_points", "name",
+      [](const ReferencePoint& point) {
+        return point.mark.name.empty() ? std::string() : in_quotes(point.mark.name);
+      },
+      reading);
   check_robots(cell, reading);
   if (cell.zero_deadline < cell.deadline)
     reading.add_mistake("timing.zero_deadline_ms", std::to_string(cell.zero_deadline.count()),
                         concat({"at least deadline_ms, ", std::to_string(cell.deadline.count())}));
+}
+
+void put_references_in_place(Cell& cell, JsonReading& reading) {
+  constexpr double taught_distance_mm = 2500;  // any will do: what is searched and compared are pixels
+  for (const View& view : cell.references.views) {
+    ReferencePoint& point = cell.references.points[view.mark];
+    const CalibratedCamera& camera = cell.calibration[view.camera];
+    const std::string path = path_of("reference_points", view.mark);
+    if (point.taught_px) {
+      const auto direction = ray(camera.model, *point.taught_px);
+      if (!direction || !in_image(camera.model, *point.taught_px)) {
+        reading.add_mistake(path + ".pixel", "a pixel outside the picture",
+                            concat({"one in the picture of ", in_quotes(camera.name)}));
+        continue;
+      }
+      point.mark.p_O_mm = camera.X_WC * (taught_distance_mm * *direction);
+      point.mark.radius_mm = point.taught_diameter_px / 2 * taught_distance_mm / camera.model.fx_px;
+      continue;
+    }
+    const auto u_px = project(camera.model, camera.X_WC.inverse() * point.mark.p_O_mm);
+    if (!u_px || !in_image(camera.model, *u_px))
+      reading.add_mistake(path + ".position_mm", "a point outside the picture",
+                          concat({"one in the picture of ", in_quotes(camera.name)}));
+  }
 }
 
 std::vector<CalibratedCamera> calibration_in_order(std::span<const CameraOptions> cameras,

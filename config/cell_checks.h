@@ -13,6 +13,10 @@ namespace zeropose {
 // could not be read are left out.
 void check_cell(const Cell& cell, JsonReading& reading);
 
+// Gives reference points that were taught as a pixel a place on its line of sight, and complains about points
+// that lie outside the picture of a camera that should see them. Precondition: the calibration is complete.
+void put_references_in_place(Cell& cell, JsonReading& reading);
+
 // The calibration of each camera of the cell, in the cell's order. Mistakes: a camera without calibration, of
 // another image size, with a lens model that does not reach its corners.
 std::vector<CalibratedCamera> calibration_in_order(std::span<const CameraOptions> cameras,

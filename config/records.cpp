@@ -18,9 +18,9 @@ namespace {
 using Json = nlohmann::ordered_json;
 using RotationAndPosition = Eigen::Matrix<double, 3, 4, Eigen::RowMajor>;
 
-constexpr double largest = 1e6;              // mm or rad: anything beyond is damage
-constexpr double rotation_tolerance = 1e-9;  // of R^T R - I
-const RecordKind zero_kind{"zeropose zero", 1};
+constexpr double largest = 1e6;                  // mm or rad: anything beyond is damage
+constexpr double rotation_tolerance = 1e-9;      // of R^T R - I
+const RecordKind zero_kind{"zeropose zero", 2};  // 2: with the pixels of the reference points
 
 std::string hash_text(std::uint32_t hash) {
   static constexpr char digits[] = "0123456789abcdef";
@@ -44,6 +44,17 @@ Json json_of(std::span<const double> values) {
   return Json(std::vector<double>(values.begin(), values.end()));
 }
 
+Json json_of(const Observation& reference) {
+  const Eigen::Matrix2d& S = reference.covariance_px2;
+  return {{"camera", reference.camera},
+          {"point", reference.mark},
+          {"u_px", reference.u_px.x()},
+          {"v_px", reference.u_px.y()},
+          {"suu", S(0, 0)},
+          {"svv", S(1, 1)},
+          {"suv", S(0, 1)}};
+}
+
 // The pose twice: six numbers for people, the rows of [R | p] to read back exactly.
 Json json_of(const ZeroRecord& record) {
   const Pose& X_WO0 = record.zero.X_WO0;
@@ -52,6 +63,8 @@ Json json_of(const ZeroRecord& record) {
   Json compensation = Json::array();
   for (const Eigen::Vector3d& shift : record.zero.compensation_O_mm)
     compensation.push_back(json_of({shift.data(), 3}));
+  Json references = Json::array();
+  for (const Observation& reference : record.zero.references) references.push_back(json_of(reference));
   return {{"job", record.job},
           {"time_utc", record.time_utc},
           {"frames", record.frames},
@@ -60,7 +73,8 @@ Json json_of(const ZeroRecord& record) {
           {"X_WO0", {six.x_mm, six.y_mm, six.z_mm, six.rx_deg, six.ry_deg, six.rz_deg}},
           {"X_WO0_rows", json_of({rows.data(), 12})},
           {"spread", json_of({record.spread.data(), 6})},
-          {"compensation_mm", compensation}};
+          {"compensation_mm", compensation},
+          {"references", references}};
 }
 
 void read_hash(JsonObject& object, std::string_view key, std::uint32_t& hash) {
@@ -88,6 +102,25 @@ void read_pose(JsonObject& object, Pose& X_WO0) {
     X_WO0 = exact;
 }
 
+// Camera and point are indices in the cell file whose hash the record carries.
+Observation read_reference(JsonObject& object) {
+  Observation reference;
+  int camera = 0, point = 0;
+  object.read("camera", camera, 0, 1000);
+  object.read("point", point, 0, 100000);
+  reference.camera = static_cast<std::size_t>(camera);
+  reference.mark = static_cast<std::size_t>(point);
+  Eigen::Matrix2d& S = reference.covariance_px2;
+  object.read("u_px", reference.u_px.x(), {-largest, largest});
+  object.read("v_px", reference.u_px.y(), {-largest, largest});
+  object.read("suu", S(0, 0), {0, largest, true});
+  object.read("svv", S(1, 1), {0, largest, true});
+  if (object.read("suv", S(0, 1), {-largest, largest}) && !(S(0, 1) * S(0, 1) < S(0, 0) * S(1, 1)))
+    object.add_mistake("suv", std::to_string(S(0, 1)), "suv^2 < suu svv: a covariance");
+  S(1, 0) = S(0, 1);
+  return reference;
+}
+
 ZeroRecord read_zero(JsonObject& object) {
   ZeroRecord record;
   object.read("job", record.job);
@@ -99,6 +132,8 @@ ZeroRecord read_zero(JsonObject& object) {
   read_pose(object, record.zero.X_WO0);
   object.read("spread", std::span<double>(record.spread.data(), 6), largest);
   object.read("compensation_mm", record.zero.compensation_O_mm, largest);
+  object.read_each("references", 0,
+                   [&](JsonObject& member) { record.zero.references.push_back(read_reference(member)); });
   return record;
 }
 

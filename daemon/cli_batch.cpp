@@ -19,6 +19,7 @@
 #include "daemon/cli_find_board.h"
 #include "daemon/cli_help.h"
 #include "daemon/cli_plan.h"
+#include "daemon/cli_recalibrate.h"
 #include "daemon/cli_triangulate.h"
 #include "measure/pose.h"
 
@@ -282,6 +283,7 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_find_board(app, exit_status);
   add_plan(app, exit_status);
   add_triangulate(app, exit_status);
+  add_recalibrate(app, exit_status);
 }
 
 }  // namespace zeropose

@@ -12,6 +12,7 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   add_calibrate_points(*verb, exit_status);
   add_calibrate_views(*verb, exit_status);
   add_calibrate_vanishing(*verb, exit_status);
+  add_calibrate_pose(*verb, exit_status);
 }
 
 }  // namespace zeropose

@@ -58,12 +58,23 @@ void print_verdict(const Json& answer) {
   std::cout << '\n';
 }
 
+// What the camera's reference points say; nothing where they were not looked at.
+std::string stand_text(const Json& camera) {
+  const Json references = camera.value("references", Json::object());
+  const std::string state = references.value("state", "unchecked");
+  if (state == "unchecked") return {};
+  return ", " + std::string(state == "moved" ? "MOVED" : state) + " by its reference points (" +
+         short_text(references["rms_px"]) + " px, " + references["seen"].dump() + " of " +
+         references["expected"].dump() + " seen)";
+}
+
 void print_status(const Json& answer) {
   std::cout << "cell " << text_or(answer, "cell") << (answer["simulated"] ? " (simulated)" : "") << ", job "
             << text_or(answer, "job") << ": " << (answer["ready"] ? "ready" : "NOT READY") << '\n';
   for (const auto& camera : answer["cameras"])
     std::cout << "  " << text_or(camera, "name") << ": "
-              << (camera["alive"] ? "there" : "MISSING: " + text_or(camera, "last_problem")) << '\n';
+              << (camera["alive"] ? "there" : "MISSING: " + text_or(camera, "last_problem"))
+              << stand_text(camera) << '\n';
   if (answer.contains("zero"))
     std::cout << "  zero: " << text_or(answer["zero"], "time") << '\n';
   else

@@ -42,6 +42,12 @@ Json zero_json(const ZeroRecord& record) {
           {"compensation_mm", compensation}};
 }
 
+Json check_json(const CameraCheck& check) {
+  return {{"state", name_of(check.stand)},   {"seen", check.seen},     {"expected", check.expected},
+          {"rms_px", check.rms_px},          {"chance", check.chance}, {"farthest", check.farthest},
+          {"farthest_px", check.farthest_px}};
+}
+
 Json status_answer(Cycle& cycle) {
   const Status status = cycle.status();
   Json cameras = Json::array();
@@ -49,6 +55,7 @@ Json status_answer(Cycle& cycle) {
     cameras.push_back({{"name", camera.name},
                        {"alive", camera.state == CameraState::alive},
                        {"last_problem", camera.last_problem},
+                       {"references", check_json(camera.check)},
                        {"frames", camera.statistics.frames},
                        {"timeouts", camera.statistics.timeouts},
                        {"damaged", camera.statistics.damaged}});

@@ -90,6 +90,7 @@ Cycle::Cycle(Cell cell, std::filesystem::path state)
       state_(std::move(state)),
       grabber_(cell_.cameras),
       pictures_(cell_.cameras.size()) {
+  forget_checks();
   load_zeros();
 }
 
@@ -178,7 +179,7 @@ void Cycle::refresh() {
   for (std::size_t i = 0; i < grabber_.size(); ++i) {
     const CameraWorker& worker = grabber_.camera(i);
     now.cameras.push_back(
-        {cell_.cameras[i].name, worker.state(), worker.last_problem(), worker.statistics()});
+        {cell_.cameras[i].name, worker.state(), worker.last_problem(), worker.statistics(), checks_[i]});
     now.cameras_known = now.cameras_known && now.cameras[i].state != CameraState::opening;
   }
   CellState cell;
@@ -188,6 +189,8 @@ void Cycle::refresh() {
     return now.cameras[i].state == CameraState::alive;
   });
   cell.zero_valid = now.zero.has_value();
+  cell.camera_moved = std::any_of(checks_.begin(), checks_.end(),
+                                  [](const CameraCheck& check) { return check.stand == CameraStand::moved; });
   cell.simulated = cell_.simulated;
   cell.config_hash = cell_.config_hash;
   cell.calibration_hash = cell_.calibration_hash;
@@ -200,6 +203,25 @@ void Cycle::refresh() {
     if (status_.cameras[i].state != now.cameras[i].state) log_change(now.cameras[i]);
   now.cycles = status_.cycles;
   status_ = std::move(now);
+}
+
+void Cycle::forget_checks() {
+  trend_ = {};
+  checks_.assign(cell_.cameras.size(), {});
+}
+
+void Cycle::remember(const ReferenceCheck& check) {
+  if (check.cameras.empty()) return;
+  trend_ = check.trend;
+  for (const CameraCheck& camera : check.cameras) {
+    CameraCheck& known = checks_.at(camera.camera);
+    if (known.stand != camera.stand)
+      spdlog::log(camera.stand == CameraStand::ok ? spdlog::level::info : spdlog::level::warn,
+                  "{}: {} by its reference points, displaced by {:.3f} px ({} of {} seen)",
+                  cell_.cameras[camera.camera].name, name_of(camera.stand), camera.rms_px, camera.seen,
+                  camera.expected);
+    known = camera;
+  }
 }
 
 Status Cycle::status() const {
@@ -274,8 +296,10 @@ Report Cycle::report_for(const Request& request) {
 }
 
 void Cycle::select(std::size_t job) {
-  if (job != selected_) X_O0O_last_.reset();
+  if (job == selected_) return;
   selected_ = job;
+  X_O0O_last_.reset();
+  forget_checks();
 }
 
 MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& on_exposed) {
@@ -301,8 +325,10 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
     return outcome;
   }
   on_exposed();
-  m = zeropose::measure(
-      {images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero, X_O0O_last_});
+  const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
+  m = zeropose::measure({images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero, X_O0O_last_,
+                         references, &trend_});
+  remember(m.references);
   outcome.compute = Clock::now() - grabbed;
   return outcome;
 }
@@ -311,6 +337,7 @@ ZeroOutcome Cycle::take_zero(TimePoint deadline) {
   const Job& job = cell_.jobs[selected_];
   const auto cameras = cameras_of(job);
   std::vector<std::vector<Observation>> observations;
+  std::vector<std::vector<MarkFinding>> references;
   for (int i = 0; i < cell_.zero_frames; ++i) {
     last_progress_ = Clock::now();
     std::vector<Frame> frames;
@@ -322,8 +349,15 @@ ZeroOutcome Cycle::take_zero(TimePoint deadline) {
     const auto findings =
         find_job_marks(images_of(cameras, frames), job, cell_.calibration, job.X_WO_nominal);
     observations.push_back(observations_of(findings, job));
+    references.push_back(find_references(images_of(cameras, frames), cell_.references, cell_.calibration));
   }
-  const ZeroResult result = make_zero(cell_.calibration, job, observations);
+  ZeroResult result = make_zero(cell_.calibration, job, observations);
+  if (result.code == Code::ok) {
+    ReferenceZero fixed = average_references(cell_.references, cell_.calibration, references);
+    result.code = fixed.code;
+    result.reason = std::move(fixed.reason);
+    result.zero.references = std::move(fixed.references);
+  }
   ZeroOutcome outcome{result.code, result.reason, {}, result.spread};
   if (result.code == Code::ok) keep(job, result, outcome);
   return outcome;
@@ -350,6 +384,7 @@ void Cycle::keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome)
   outcome.record = record;
   zeros_[selected_] = {Code::ok, {}, record};
   X_O0O_last_.reset();
+  forget_checks();
   spdlog::info("job {}: zero {} taken", job.name, hex(record.id));
 }
 

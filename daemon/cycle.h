@@ -47,6 +47,7 @@ struct CameraStatus {
   CameraState state = CameraState::opening;
   std::string last_problem;
   CameraStatistics statistics;
+  CameraCheck check;  // its reference points, when they were last looked at
 };
 
 struct Status {
@@ -104,6 +105,8 @@ class Cycle {
   ZeroOutcome take_zero(TimePoint deadline);
   void keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome);
   Snapshot snapshot(std::size_t camera);
+  void remember(const ReferenceCheck& check);
+  void forget_checks();  // with a new zero or another job
   void load_zeros();
 
   const Cell cell_;
@@ -118,6 +121,8 @@ class Cycle {
   // The last result that a robot was sent as valid: what the step limit compares with. None after the start,
   // a new zero, a change of job and a Reset.
   std::optional<Pose> X_O0O_last_;
+  ReferenceTrend trend_;             // since the zero of the selected job
+  std::vector<CameraCheck> checks_;  // by camera, when its references were last looked at
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

@@ -123,6 +123,18 @@ constexpr std::array table{
         "send Reset, select another job or take a new zero: the next result is then not compared. "
         "Acknowledge alone does not do it."},
 
+    CodeText{
+        Code::camera_moved, "camera_moved", "A camera is not where it was at the zero measurement.",
+        "Look at the camera and its holder: put it back, or find its new pose with zeropose recalibrate, "
+        "put that into the calibration file and take a new zero."},
+    CodeText{
+        Code::reference_missing, "reference_missing",
+        "A camera sees too few of its reference points to tell whether it was moved.",
+        "Free, clean or light the reference points that are named; look whether the camera was turned away."},
+    CodeText{Code::camera_suspicious, "camera_suspicious",
+             "The reference points of a camera drift, and the cell file says that this blocks.",
+             "Look at the camera, its holder and the reference points; take a new zero when all is firm."},
+
     CodeText{Code::zero_missing, "zero_missing", "No zero measurement exists for this job.",
              "Put the object into its ideal position and make the zero measurement."},
     CodeText{Code::zero_outdated, "zero_outdated",

@@ -51,6 +51,10 @@ enum class Code : std::uint16_t {
   limit_displacement = 508,
   step_too_large = 509,
 
+  camera_moved = 601,
+  reference_missing = 602,
+  camera_suspicious = 603,
+
   zero_missing = 701,
   zero_outdated = 702,
   storage_failed = 703,

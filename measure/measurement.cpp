@@ -195,6 +195,17 @@ bool passes(Measurement& measurement, Verdict verdict) {
   return measurement.code == Code::ok;
 }
 
+// M6.7. Precondition: the problem has references.
+bool cameras_stand(Measurement& measurement, const MeasurementProblem& problem) {
+  static const ReferenceTrend none;
+  const References& references = *problem.references;
+  measurement.reference_findings = find_references(problem.images, references, problem.cameras);
+  measurement.references =
+      check_references({references, problem.cameras, problem.zero.references, measurement.reference_findings,
+                        problem.reference_trend != nullptr ? *problem.reference_trend : none});
+  return passes(measurement, {measurement.references.code, measurement.references.reason});
+}
+
 bool find_all(Measurement& measurement, std::span<const CameraImage> images, const Job& job,
               std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected) {
   measurement.findings = find_job_marks(images, job, cameras, X_WO_expected);
@@ -290,10 +301,11 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
 }
 
 Measurement measure(const MeasurementProblem& problem) {
-  const auto& [images, job, cameras, zero, X_O0O_last] = problem;
+  const auto& [images, job, cameras, zero, X_O0O_last, references, reference_trend] = problem;
   Measurement measurement;
   if (!passes(measurement, check_zero(job, zero))) return measurement;
   if (!passes(measurement, check_images(images, job, cameras))) return measurement;
+  if (references != nullptr && !cameras_stand(measurement, problem)) return measurement;
   const Job now = compensated(job, zero);
   if (!find_all(measurement, images, now, cameras, zero.X_WO0)) return measurement;
   if (!estimate_all(measurement, now, cameras, zero.X_WO0)) return measurement;

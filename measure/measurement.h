@@ -9,6 +9,7 @@
 #include "measure/image.h"
 #include "measure/job.h"
 #include "measure/pose.h"
+#include "measure/references.h"
 #include "measure/zero.h"
 
 namespace zeropose {
@@ -29,6 +30,8 @@ struct Measurement {
   double largest_deviation_mm = 0;  // of the effective marks
   double sigma_mm = 0;              // at the worst application point
   double hidden_mm = 0;             // what one wrong mark could do at the worst application point unnoticed
+  std::vector<MarkFinding> reference_findings;  // one per view of the references
+  ReferenceCheck references;
 };
 
 // Where find_job_marks() looks: one search per view of the job (the snapshot draws them). The window reaches
@@ -51,10 +54,13 @@ struct MeasurementProblem {
   std::span<const CalibratedCamera> cameras;
   const Zero& zero;                  // without compensations (default-made) it is missing
   std::optional<Pose> X_O0O_last{};  // the last valid result that a robot was sent, for the step limit (M6.6)
+  const References* references = nullptr;           // none: no camera is checked
+  const ReferenceTrend* reference_trend = nullptr;  // of the last measurement; none: a first one
 };
 
-// Marks, pose, security and limits in the order of M6; the first check that fails names the code. Marks are
-// searched around the zero pose and used where the zero measurement's compensation puts them.
+// Marks, references, pose, security and limits in the order of M6, but for the cameras: one that was moved is
+// the cause of all that follows, so it is asked about before the pose. The first check that fails names the
+// code. Marks are searched around the zero pose and used where the zero measurement's compensation puts them.
 //
 // image_blurred and image_saturated also where the job's requirements on marks fail only because the finder
 // calls marks blurred or saturated: with those they would be met.

@@ -63,6 +63,7 @@ std::uint16_t Handshake::status() const {
   if (error_) bits |= status_bit::error;
   if (cell_.simulated) bits |= status_bit::simulated;
   if (!cell_.zero_valid) bits |= status_bit::zero_missing;
+  if (cell_.camera_moved) bits |= status_bit::camera_moved;
   return static_cast<std::uint16_t>(bits);
 }
 
@@ -131,7 +132,7 @@ void Handshake::set_cell_state(const CellState& cell, TimePoint now) {
   tick(now);
   const bool other_basis = !same_basis(cell, cell_);
   cell_ = cell;
-  if (answer_ && answer_->valid() && (other_basis || !is_ready())) answer_.reset();
+  if (answer_ && answer_->valid() && (other_basis || !is_ready() || cell_.camera_moved)) answer_.reset();
   refresh();
 }
 
@@ -292,6 +293,7 @@ Code Handshake::code_of(const Execution& execution, const Report& report) const 
   if (!cell_.config_valid) return Code::not_ready;
   if (!cell_.cameras_alive) return Code::camera_missing;
   if (!cell_.zero_valid) return Code::zero_missing;
+  if (cell_.camera_moved) return Code::camera_moved;
   return same_basis(cell_, execution.cell) ? Code::ok : Code::zero_outdated;
 }
 

@@ -56,6 +56,7 @@ struct CellState {
   bool zero_valid = false;     // of the selected job, for this calibration
   bool simulated = false;
   std::uint32_t config_hash = 0, calibration_hash = 0, zero_id = 0;
+  bool camera_moved = false;  // when its references were last looked at; a new Measure looks again
 };
 
 }  // namespace zeropose

@@ -24,6 +24,7 @@ constexpr double standing_depth_share = 0.85;  // standing things hang nearer th
 struct Stage {
   const CalibratedCamera& camera;
   std::vector<Mark> marks;  // that this camera sees
+  std::vector<Mark> fixed;  // reference points that it sees
   Pose X_WO;
   Pose X_CO;
   Pose X_CP;             // P: the panel behind the marks, axes roughly as the camera's
@@ -40,17 +41,18 @@ struct Stage {
   }
 };
 
-std::vector<Mark> marks_of(const Scene& scene, std::size_t camera) {
+std::vector<Mark> marks_of(const std::vector<Mark>& all, const std::vector<View>& views, std::size_t camera) {
   std::vector<Mark> marks;
-  for (const View& view : scene.views)
-    if (view.camera == camera) marks.push_back(scene.marks.at(view.mark));
+  for (const View& view : views)
+    if (view.camera == camera) marks.push_back(all.at(view.mark));
   return marks;
 }
 
 Stage make_stage(const Scene& scene, std::size_t camera_index, Random& random) {
   const CalibratedCamera& camera = scene.cameras.at(camera_index);
   Stage stage{.camera = camera,
-              .marks = marks_of(scene, camera_index),
+              .marks = marks_of(scene.marks, scene.views, camera_index),
+              .fixed = marks_of(scene.fixed_marks, scene.fixed_views, camera_index),
               .X_WO = scene.X_WO_nominal,
               .X_CO = camera.X_WC.inverse() * scene.X_WO_nominal,
               .X_CP = Pose::Identity(),
@@ -272,6 +274,15 @@ Sheet hall(const Stage& stage, Random& random) {
 
 // ---- clutter
 
+// Reference points stand in front of everything: nothing may come near.
+void take_fixed(const Stage& stage, const std::vector<MarkPlate>& fixed_plates, std::vector<Taken>& taken) {
+  for (const MarkPlate& plate : fixed_plates) {
+    const Vector3d p_C = stage.camera.X_WC.inverse() * plate.X_OM.translation();
+    const auto u = project(stage.camera.model, p_C);
+    if (u) taken.push_back({*u, plate_reach_mm(plate) * stage.camera.model.fx_px / p_C.z() + clearance_px});
+  }
+}
+
 // How far a mark's centre can be from its nominal place in the image.
 double excursion_px(const Mark& mark, const Stage& stage) {
   const auto nominal = project(stage.camera.model, stage.X_CO * mark.p_O_mm);
@@ -352,10 +363,18 @@ Backdrop make_backdrop(const Scene& scene, std::size_t camera) {
   for (const Mark& mark : stage.marks) backdrop.plates.push_back(make_plate(mark, stage, looks));
   backdrop.behind.push_back(hall(stage, looks));
   backdrop.on_object.push_back(underbody(stage, backdrop.plates, looks));
+  Random fixed_looks(scene.picture.seed * 1000 + 250 + camera);
+  Stage world = stage;
+  world.X_CO = stage.camera.X_WC.inverse();
+  for (const Mark& mark : stage.fixed) backdrop.fixed_plates.push_back(make_plate(mark, world, fixed_looks));
+  std::vector<Taken> on_object = taken_for_object(stage, backdrop.plates),
+                     in_front = taken_for_standing(stage);
+  take_fixed(stage, backdrop.fixed_plates, on_object);
+  take_fixed(stage, backdrop.fixed_plates, in_front);
   const int standing = scene.picture.clutter / 3;
-  add_object_clutter(stage, scene.picture.clutter - standing, taken_for_object(stage, backdrop.plates),
-                     backdrop.on_object.back(), clutter);
-  backdrop.in_front = standing_clutter(stage, standing, taken_for_standing(stage), clutter);
+  add_object_clutter(stage, scene.picture.clutter - standing, std::move(on_object), backdrop.on_object.back(),
+                     clutter);
+  backdrop.in_front = standing_clutter(stage, standing, std::move(in_front), clutter);
   return backdrop;
 }
 

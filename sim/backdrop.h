@@ -10,8 +10,8 @@
 
 namespace zeropose {
 
-// A mark on the object, on its plate. The plate is flat, of one grey and free of everything for at least 16
-// mm round the mark.
+// A mark on the object (a reference point: in the world), on its plate. The plate is flat, of one grey and
+// free of everything for at least 16 mm round the mark.
 struct MarkPlate {
   std::string name;
   Pose X_OM = Pose::Identity();  // M: origin in the mark's centre, z its normal
@@ -27,7 +27,8 @@ struct Backdrop {
   std::vector<Sheet> behind;     // standing, in the camera's frame
   std::vector<Sheet> on_object;  // in O
   std::vector<MarkPlate> plates;
-  std::vector<Sheet> in_front;  // standing, in the camera's frame
+  std::vector<MarkPlate> fixed_plates;  // of the reference points, in W instead of O; nearer than the object
+  std::vector<Sheet> in_front;          // standing, in the camera's frame
 };
 
 // Follows from the scene's seed and the camera's index alone. Clutter never is a round disc of a mark's size.

@@ -39,7 +39,7 @@ double number(const Json& question, const char* key, double otherwise) {
   return *found;
 }
 
-void shift(SimulatedCell& cell, const Json& question) {
+Pose pose(const Json& question) {
   const auto found = question.find("pose");
   if (found == question.end() || !found->is_array() || found->size() != 6)
     throw invalid_argument("'pose' must be [x, y, z, rx, ry, rz], mm and degrees");
@@ -48,7 +48,17 @@ void shift(SimulatedCell& cell, const Json& question) {
     if (!(*found)[i].is_number()) throw invalid_argument("'pose' has something that is no number");
     six[i] = (*found)[i];
   }
-  cell.show(cell.scene().X_WO_nominal * pose_from(six));
+  return pose_from(six);
+}
+
+void shift(SimulatedCell& cell, const Json& question) {
+  cell.show(cell.scene().X_WO_nominal * pose(question));
+}
+
+// Without a pose by 0.05 degrees about its y axis.
+void move_camera(SimulatedCell& cell, const Json& question) {
+  const Pose X_CoCn = question.contains("pose") ? pose(question) : from_six_numbers({0, 0, 0, 0, 0.05, 0});
+  cell.move_camera(text(question, "camera"), X_CoCn);
 }
 
 Json truth(const SimulatedCell& cell) {
@@ -69,6 +79,7 @@ void fault(SimulatedCell& cell, const Json& question) {
   const std::map<std::string, std::function<void()>> kinds = {
       {"camera-dead", [&] { cell.stop_camera(text(question, "camera")); }},
       {"camera-back", [&] { cell.start_camera(text(question, "camera")); }},
+      {"camera-moved", [&] { move_camera(cell, question); }},
       {"lose-packets", [&] { cell.lose_packets(text(question, "camera"), number(question, "ratio", 0.01)); }},
       {"cover-mark", [&] { cell.cover_mark(text(question, "mark")); }},
       {"wrong-mark", [&] { cell.displace_mark(text(question, "mark"), number(question, "px", 20)); }},

@@ -8,6 +8,7 @@ namespace zeropose {
 
 CameraRenderer::CameraRenderer(const Scene& scene, std::size_t camera)
     : rays_(scene.cameras.at(camera).model),
+      name_(scene.cameras.at(camera).name),
       X_CW_(scene.cameras.at(camera).X_WC.inverse()),
       backdrop_(make_backdrop(scene, camera)),
       blur_sigma_px_(scene.picture.blur_sigma_px) {}
@@ -31,21 +32,25 @@ std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults&
       static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px),
       static_cast<float>(backdrop_.hall_grey));
   Painter painter(rays_, blur_sigma_px_, picture);
-  const Pose X_CO = X_CW_ * X_WO;
-  for (const Sheet& sheet : backdrop_.behind) painter.paint(sheet, Pose::Identity());
+  const auto moved = faults.moved_cameras.find(name_);
+  const Pose X_CnCo = moved == faults.moved_cameras.end() ? Pose::Identity() : moved->second.inverse();
+  const Pose X_CW = X_CnCo * X_CW_, X_CO = X_CW * X_WO;
+  for (const Sheet& sheet : backdrop_.behind) painter.paint(sheet, X_CnCo);
   for (const Sheet& sheet : backdrop_.on_object) painter.paint(sheet, X_CO);
-  for (const MarkPlate& plate : backdrop_.plates) {
-    const Placed placed = place(plate, X_CO, faults);
-    painter.paint({Pose::Identity(), plate.things}, placed.X_CM);
-    if (placed.covered) painter.paint({Pose::Identity(), plate.cover}, placed.X_CM);
+  std::vector<std::pair<const MarkPlate*, Placed>> plates;
+  for (const MarkPlate& plate : backdrop_.plates) plates.emplace_back(&plate, place(plate, X_CO, faults));
+  for (const MarkPlate& plate : backdrop_.fixed_plates)
+    plates.emplace_back(&plate, place(plate, X_CW, faults));
+  for (const auto& [plate, placed] : plates) {
+    painter.paint({Pose::Identity(), plate->things}, placed.X_CM);
+    if (placed.covered) painter.paint({Pose::Identity(), plate->cover}, placed.X_CM);
   }
-  for (const Sheet& sheet : backdrop_.in_front) painter.paint(sheet, Pose::Identity());
+  for (const Sheet& sheet : backdrop_.in_front) painter.paint(sheet, X_CnCo);
   painter.illuminate(backdrop_.light);
-  for (const MarkPlate& plate : backdrop_.plates) {
-    const Placed placed = place(plate, X_CO, faults);
+  for (const auto& [plate, placed] : plates) {
     if (placed.covered) continue;
-    render_disc(camera, {placed.X_CM, plate.radius_mm, plate.mark_grey, plate.surface_grey}, backdrop_.light,
-                blur_sigma_px_, picture);
+    render_disc(camera, {placed.X_CM, plate->radius_mm, plate->mark_grey, plate->surface_grey},
+                backdrop_.light, blur_sigma_px_, picture);
   }
   return picture;
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "sim/backdrop.h"
@@ -30,6 +31,7 @@ class CameraRenderer {
   Placed place(const MarkPlate& plate, const Pose& X_CO, const Faults& faults) const;
 
   PixelRays rays_;
+  std::string name_;
   Pose X_CW_;
   Backdrop backdrop_;
   double blur_sigma_px_;

@@ -49,6 +49,8 @@ Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
   const Job& job = cell.jobs.front();
   scene.marks = job.marks;
   scene.views = job.views;
+  for (const ReferencePoint& point : cell.references.points) scene.fixed_marks.push_back(point.mark);
+  scene.fixed_views = cell.references.views;
   scene.X_WO_nominal = job.X_WO_nominal;
   scene.picture = truth.picture;
   return scene;

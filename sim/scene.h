@@ -25,20 +25,24 @@ struct PictureSettings {
   std::uint64_t seed = 1;
 };
 
-// The true cameras, in the order of the cell's cameras, and the job's marks and views.
+// The true cameras, in the order of the cell's cameras, the job's marks and views, and the cell's reference
+// points as marks of the world.
 struct Scene {
   std::vector<CalibratedCamera> cameras;
   std::vector<Mark> marks;
   std::vector<View> views;
+  std::vector<Mark> fixed_marks;
+  std::vector<View> fixed_views;
   Pose X_WO_nominal = Pose::Identity();
   PictureSettings picture;
 };
 
-// What is wrong with the marks for a while.
+// What is wrong with marks and cameras for a while.
 struct Faults {
-  std::set<std::string> covered;               // names of marks that are hidden
-  std::map<std::string, double> displaced_px;  // marks that sit off their place: by so much to the right in
-                                               // the image, at the same distance
+  std::set<std::string> covered;                // names of marks and reference points that are hidden
+  std::map<std::string, double> displaced_px;   // marks that sit off their place: by so much to the right in
+                                                // the image, at the same distance
+  std::map<std::string, Pose> moved_cameras{};  // X_CoCn by the camera's name
 };
 
 // The scene of the cell's first job with the truth of the file CELL.sim.json. Throws ConfigError: names file

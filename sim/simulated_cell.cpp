@@ -75,7 +75,8 @@ Faults SimulatedCell::faults() const {
 }
 
 void SimulatedCell::require_mark(const std::string& mark) const {
-  if (std::ranges::find(scene_.marks, mark, &Mark::name) == scene_.marks.end())
+  if (std::ranges::find(scene_.marks, mark, &Mark::name) == scene_.marks.end() &&
+      std::ranges::find(scene_.fixed_marks, mark, &Mark::name) == scene_.fixed_marks.end())
     throw std::invalid_argument("no mark '" + mark + "' in the cell");
 }
 
@@ -98,6 +99,13 @@ void SimulatedCell::displace_mark(const std::string& mark, double displacement_p
   require_mark(mark);
   const std::lock_guard lock(mutex_);
   faults_.displaced_px[mark] = displacement_px;
+  render();
+}
+
+void SimulatedCell::move_camera(const std::string& camera, const Pose& X_CoCn) {
+  index_of(camera);  // throws where there is none
+  const std::lock_guard lock(mutex_);
+  faults_.moved_cameras[camera] = X_CoCn;
   render();
 }
 

@@ -49,6 +49,7 @@ class SimulatedCell {
 
   void cover_mark(const std::string& mark);
   void displace_mark(const std::string& mark, double displacement_px);
+  void move_camera(const std::string& camera, const Pose& X_CoCn);  // from where it truly is
   void stop_camera(const std::string& camera);
   void start_camera(const std::string& camera);
   void lose_packets(const std::string& camera, double ratio);  // of the stream, 0..1

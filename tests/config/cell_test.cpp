@@ -56,6 +56,56 @@ TEST(Cell, LoadsTheExamplesJob) {
   EXPECT_EQ(job.application_points.at(3).name, "rear right");
 }
 
+TEST(Cell, LoadsTheExamplesReferencePoints) {
+  const Cell cell = load_cell(ZEROPOSE_SOURCE_DIR "/config/cells/car-body.json");
+  ASSERT_EQ(cell.references.points.size(), 12U);
+  ASSERT_EQ(cell.references.views.size(), 12U);
+  for (std::size_t i = 0; i < 12; ++i) {
+    EXPECT_EQ(cell.references.views[i].mark, i);
+    EXPECT_EQ(cell.references.views[i].camera, i / 3);
+    EXPECT_TRUE(cell.references.points[i].mark.bright);
+  }
+  EXPECT_EQ(cell.references.search_mm, 20);
+  EXPECT_EQ(cell.references.sigma_px, 0.05);
+  EXPECT_FALSE(cell.references.suspicious_blocks);
+}
+
+TEST(Cell, AReferenceThatWasTaughtAsAPixelLiesOnItsLineOfSight) {
+  Json json = example();
+  json["reference_points"][0] = parsed(
+      R"({"name": "t", "cameras": ["camera2"], "kind": "dark_disc", "pixel": [100, 90], "diameter_px": 30})");
+  const Cell cell = parse_cell({json.dump(), "", example_calibration_text(), ""});
+  const ReferencePoint& point = cell.references.points[0];
+  const CalibratedCamera& camera = cell.calibration[1];
+  const Eigen::Vector3d p_C = camera.X_WC.inverse() * point.mark.p_O_mm;
+  EXPECT_LT((*project(camera.model, p_C) - Eigen::Vector2d(100, 90)).norm(), 1e-6);
+  EXPECT_NEAR(2 * point.mark.radius_mm * camera.model.fx_px / p_C.z(), 30, 1e-9);
+}
+
+TEST(Cell, NamesWhatIsWrongWithAReferencePoint) {
+  const auto mistake = [](const char* key, const Json& value) {
+    Json json = example();
+    Json& point = json["reference_points"][1];
+    if (value.is_null())
+      point.erase(key);
+    else
+      point[key] = value;
+    const auto mistakes = mistakes_in(json);
+    EXPECT_EQ(mistakes.size(), 1U) << key;
+    return mistakes.empty() ? std::string() : mistakes.front();
+  };
+  EXPECT_THAT(mistake("position_mm", nullptr),
+              HasSubstr("reference_points[1].position_mm: found neither position_mm nor pixel"));
+  EXPECT_THAT(mistake("position_mm", {0, 0, 100000}),
+              HasSubstr("reference_points[1].position_mm: found a point outside the picture"));
+  EXPECT_THAT(mistake("radius_mm", nullptr),
+              HasSubstr("reference_points[1].radius_mm: found a point without it"));
+  EXPECT_THAT(mistake("name", "camera1/R1"), HasSubstr("as in reference_points[0]"));
+  EXPECT_THAT(mistake("cameras", {"camera9"}),
+              HasSubstr("reference_points[1].cameras[0]: found \"camera9\""));
+  EXPECT_THAT(mistake("colour", "red"), HasSubstr("reference_points[1].colour: found an unknown key"));
+}
+
 TEST(Cell, ReadsTheOptionalKeys) {
   Json json = example();
   json["$schema"] = "../cell.schema.json";

@@ -24,6 +24,13 @@ ZeroRecord example(unsigned seed) {
   record.zero.X_WO0.translation() = 1000 * Eigen::Vector3d(any(random), any(random), any(random));
   for (int mark = 0; mark < 12; ++mark)
     record.zero.compensation_O_mm.emplace_back(any(random), any(random), any(random));
+  for (std::size_t point = 0; point < 3; ++point) {
+    Observation& reference = record.zero.references.emplace_back();
+    reference.camera = point % 2;
+    reference.mark = point;
+    reference.u_px = 500 * Eigen::Vector2d(any(random), any(random));
+    reference.covariance_px2 << 1 + any(random) / 2, 0.1, 0.1, 1 + any(random) / 2;
+  }
   for (double& value : record.spread) value = any(random) / 3;
   record.time_utc = "2026-01-31T12:34:56Z";
   record.frames = 10;
@@ -36,6 +43,14 @@ void expect_same(const ZeroRecord& a, const ZeroRecord& b) {
   EXPECT_EQ(a.job, b.job);
   EXPECT_TRUE(a.zero.X_WO0.matrix() == b.zero.X_WO0.matrix());
   EXPECT_TRUE(a.zero.compensation_O_mm == b.zero.compensation_O_mm);
+  ASSERT_EQ(a.zero.references.size(), b.zero.references.size());
+  for (std::size_t i = 0; i < a.zero.references.size(); ++i) {
+    const Observation &r = a.zero.references[i], &s = b.zero.references[i];
+    EXPECT_EQ(r.camera, s.camera);
+    EXPECT_EQ(r.mark, s.mark);
+    EXPECT_TRUE(r.u_px == s.u_px);
+    EXPECT_TRUE(r.covariance_px2 == s.covariance_px2);
+  }
   EXPECT_TRUE(a.spread == b.spread);
   EXPECT_EQ(a.time_utc, b.time_utc);
   EXPECT_EQ(a.frames, b.frames);
@@ -154,7 +169,7 @@ TEST(Records, WhatIsWrongIsNamed) {
     return error_of(directory.path(), "body");
   };
   EXPECT_THAT(with("\"frames\":10", "\"frames\":11"), HasSubstr(path.string() + ": sha256: found \""));
-  EXPECT_THAT(with("\"version\":1", "\"version\":2"), HasSubstr("version: found 2, expected 1"));
+  EXPECT_THAT(with("\"version\":2", "\"version\":1"), HasSubstr("version: found 1, expected 2"));
   EXPECT_THAT(with("zeropose zero", "zeropose cell"),
               HasSubstr("format: found \"zeropose cell\", expected \"zeropose zero\""));
   EXPECT_THAT(with("\"content\"", "\"contents\""), HasSubstr("content: found no such key"));

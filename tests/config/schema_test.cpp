@@ -43,10 +43,17 @@ Json full_example() {
   json["jobs"][0]["marks"][0]["kind"] = "dark_ring";
   json["jobs"][0]["marks"][0]["inner_radius_mm"] = 1;
   json["jobs"][0]["planar"] = {0, 0, 0, 0, 0, 0};
+  json["jobs"][0]["requirements"]["max_hidden_mm"] = 1.5;
   json["jobs"][0]["requirements"]["max_displacement_mm"] = 45;
   json["jobs"][0]["requirements"]["max_step_mm"] = 30;
   json["jobs"][0]["requirements"]["max_step_deg"] = 0.25;
   json["robots"][0]["axis"] = {{"direction", {1, 0, 0}}, {"zero_mm", 0}};
+  json["reference_points"] =
+      Json::array({parsed(R"({"name": "r", "cameras": ["camera1"], "kind": "bright_ring", "radius_mm": 5,
+    "inner_radius_mm": 2, "position_mm": [-525, -751, 200], "normal": [0, -0.6, -0.8], "pixel": [100, 90],
+    "diameter_px": 30, "group": "plate"})")});
+  json["reference_check"] =
+      parsed(R"({"search_mm": 20, "sigma_px": 0.05, "tolerance_px": 0.1, "suspicious_blocks": true})");
   json["robots"][0]["require_command_crc"] = false;
   json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
   json["robots"][0]["allowed_readers"] = {"10.0.0.2"};

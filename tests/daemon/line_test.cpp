@@ -129,6 +129,33 @@ TEST_F(Line, WrongMarkIsNamedAndRemoved) {
   expect_good_car(random_shift(generator));
 }
 
+// R19: turned by 0.05 degrees it is named in the next measurement, put back the cell goes on.
+TEST_F(Line, MovedCameraIsNamedAndPutBackItCountsAgain) {
+  start_all();
+  expect_good_car(random_shift(generator));
+  line.fault("camera-moved", {{"camera", "camera2"}, {"pose", {0, 0, 0, 0.05, 0, 0}}});
+  expect_code(Code::camera_moved);
+  EXPECT_TRUE(line.robot().read().block.has(status_bit::camera_moved));
+  EXPECT_THAT(line.zeropose({"status"}).out, HasSubstr("camera2: there, MOVED by its reference points"));
+  EXPECT_THAT(line.zeropose({"measure"}).out,
+              HasSubstr("the reference points of camera2 are displaced by 3."));
+  line.fault("camera-moved", {{"camera", "camera2"}, {"pose", {0.5, 0, 0, 0, 0, 0}}});
+  expect_code(Code::camera_moved);
+  line.fault("clear");
+  expect_good_car(random_shift(generator));
+  EXPECT_FALSE(line.robot().read().block.has(status_bit::camera_moved));
+}
+
+TEST_F(Line, CoveredReferencesAreNamed) {
+  start_all();
+  line.fault("cover-mark", {{"mark", "camera1/R1"}});
+  expect_good_car(random_shift(generator));
+  line.fault("cover-mark", {{"mark", "camera1/R2"}});
+  expect_code(Code::reference_missing);
+  line.fault("clear");
+  expect_good_car(random_shift(generator));
+}
+
 TEST_F(Line, ResultOutsideALimitIsRefusedWithItsAxis) {
   start_all();
   line.shift(from_six_numbers({45, 0, 0, 0, 0, 0}));

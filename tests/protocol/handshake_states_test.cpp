@@ -110,13 +110,11 @@ TEST_F(HandshakeTest, MeasureWhenNotReadyGetsItsCode) {
 }
 
 TEST_F(HandshakeTest, ResultIsWithdrawnWhenTheCellChanges) {
-  const auto changes = {+[](CellState& c) { c.config_valid = false; },
-                        +[](CellState& c) { c.cameras_alive = false; },
-                        +[](CellState& c) { c.zero_valid = false; },
-                        +[](CellState& c) { c.simulated = true; },
-                        +[](CellState& c) { ++c.config_hash; },
-                        +[](CellState& c) { ++c.calibration_hash; },
-                        +[](CellState& c) { ++c.zero_id; }};
+  const auto changes = {
+      +[](CellState& c) { c.config_valid = false; }, +[](CellState& c) { c.cameras_alive = false; },
+      +[](CellState& c) { c.zero_valid = false; },   +[](CellState& c) { c.camera_moved = true; },
+      +[](CellState& c) { c.simulated = true; },     +[](CellState& c) { ++c.config_hash; },
+      +[](CellState& c) { ++c.calibration_hash; },   +[](CellState& c) { ++c.zero_id; }};
   std::uint32_t id = 0;
   for (const auto change : changes) {
     handshake->set_cell_state(ready_cell(), now);
@@ -139,6 +137,7 @@ TEST_F(HandshakeTest, ResultOfAnotherCellIsNotPublished) {
   const Change changes[] = {{[](CellState& c) { c.config_valid = false; }, 103},
                             {[](CellState& c) { c.cameras_alive = false; }, 201},
                             {[](CellState& c) { c.zero_valid = false; }, 701},
+                            {[](CellState& c) { c.camera_moved = true; }, 601},
                             {[](CellState& c) { ++c.zero_id; }, 702},
                             {[](CellState& c) { ++c.calibration_hash; }, 702}};
   std::uint32_t id = 0;

@@ -32,6 +32,20 @@ TEST_F(HandshakeTest, CellStateDecidesTheState) {
   EXPECT_EQ(block().status, status_bit::ready);
 }
 
+// A camera that was moved does not stop the robot from asking again: each Measure looks at the references
+// anew.
+TEST_F(HandshakeTest, AMovedCameraIsShownAndLooksAgain) {
+  CellState cell = ready_cell();
+  cell.camera_moved = true;
+  handshake->set_cell_state(cell, now);
+  EXPECT_EQ(block().status, status_bit::ready | status_bit::camera_moved);
+  EXPECT_TRUE(measure(1).request);
+  cell.camera_moved = false;
+  handshake->set_cell_state(cell, now);
+  report(ok_report(1));
+  expect_valid(1);
+}
+
 TEST_F(HandshakeTest, SimulatedCellsSaySo) {
   CellState cell = ready_cell();
   cell.simulated = true;
