@@ -159,7 +159,7 @@ class Recalibrate(Case):
 
 class CalibratePose(Case):
     def published(self):
-        rows = list(csv.DictReader((SOURCE / "tests/golden/pose-reference-points.csv").open()))
+        rows = list(csv.DictReader((SOURCE / "tests/golden/pose-reference-points.csv").read_text().splitlines()))
         values = {}
         for row in rows:
             values.setdefault(row["kind"], []).append([float(row[c]) for c in "abcdef"])
