@@ -1,5 +1,5 @@
-// The verbs that need no running daemon: check-config, pose, bestfit, triangulate, calibrate, recalibrate, convert,
-// find, find-board, plan (spec 92).
+// The verbs that need no running daemon: check-config, pose, bestfit, triangulate, calibrate, recalibrate,
+// convert, find, find-board, plan (spec 92).
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -6,6 +6,7 @@
 
 #include "calib/words.h"
 #include "measure/pose_deletion.h"
+#include "measure/reliability.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -13,19 +14,12 @@ namespace {
 
 using Set = std::vector<std::size_t>;
 
-// Chance that good observations alone raise the alarm, per estimate.
-constexpr double false_alarm = 0.001;
 // Explanations whose poses differ by no more than four standard deviations need not be told apart.
 constexpr double same_pose2 = 16;
 // More sets of equal size than this are not looked at one by one, and of these not more than that many are
 // estimated.
 constexpr double max_sets = 5000;
 constexpr std::size_t max_estimates = 64;
-
-// Of the length of a normalised deviation, two degrees of freedom.
-double critical_value(std::size_t observations) {
-  return std::sqrt(-2 * std::log(false_alarm / static_cast<double>(observations)));
-}
 
 bool is_wrong(const PoseModel& model, std::size_t i, double critical) {
   const Mark& mark = model.mark(i);
@@ -35,7 +29,7 @@ bool is_wrong(const PoseModel& model, std::size_t i, double critical) {
 
 // The active observation that deviates most among the wrong ones.
 std::optional<std::size_t> worst(const PoseModel& model) {
-  const double critical = critical_value(static_cast<std::size_t>(model.active_count()));
+  const double critical = critical_deviation(static_cast<std::size_t>(model.active_count()));
   std::optional<std::size_t> found;
   for (std::size_t i = 0; i < model.size(); ++i)
     if (model.active(i) && is_wrong(model, i, critical) &&
@@ -200,7 +194,7 @@ class Search {
   // Agreeing observations leave no larger misfit: each has its critical value, and its deviation has no more
   // than its own variance, with weights that are not inverse variances not much more.
   double agreeing_misfit(std::size_t k) const {
-    const double critical = critical_value(active_.size());
+    const double critical = critical_deviation(active_.size());
     return static_cast<double>(active_.size() - k) * critical * critical * (model_.plain() ? 1 : 2);
   }
 
@@ -229,7 +223,7 @@ class Search {
 
   // The first to be removed may have been good ones, shown in a bad light by the others.
   bool take_back(Explanation& greedy) {
-    const double critical = critical_value(active_.size());
+    const double critical = critical_deviation(active_.size());
     for (std::size_t at = 0; at < greedy.removed.size();) {
       const std::size_t i = greedy.removed[at];
       if (is_wrong(model_, i, critical)) {

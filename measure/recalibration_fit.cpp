@@ -21,8 +21,8 @@ using Eigen::Vector3d;
 
 // Ways to place all groups that are tried; each plate of three points has two as a rule.
 constexpr std::size_t most_placements = 16;
-const double unlikely = 2 * std::log(20.0);  // of a placement twenty times less likely than the best one
-constexpr double same_change = 1e-6;         // rad, and mm / 1000
+const double unlikely = 2 * std::log(1000.0);  // of a placement so many times less likely than the best one
+constexpr double same_change = 1e-6;           // rad, and mm / 1000
 
 Vector3d direction_of(const CameraModel& model, const Vector2d& u_px) { return *ray(model, u_px); }
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "calib/words.h"
-#include "measure/chi_squared.h"
+#include "calib/chance.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -154,7 +154,7 @@ TeachingResult teach(const TeachingProblem& problem) {
     Averaged averaged = average_of(mark);
     result.marks.push_back(std::move(averaged.taught));
     if (mark.places.size() < 2) continue;
-    const double chance = chi_squared_tail(averaged.misfit, 3 * (static_cast<int>(mark.places.size()) - 1));
+    const double chance = chi_square_tail(averaged.misfit, 3 * (static_cast<int>(mark.places.size()) - 1));
     // Chances too small for a number are all the same: then the last one is as good a name as any.
     if (chance > least_chance) continue;
     least_chance = chance;

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "calib/words.h"
-#include "measure/chi_squared.h"
+#include "calib/chance.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -220,7 +220,7 @@ void judge(const TriangulationProblem& problem, const Minimum& minimum, Triangul
   const int redundancy = 2 * static_cast<int>(problem.observations.size()) - 3;
   const double misfit = minimum.equations.cost;
   point.code = Code::ok;
-  if (chi_squared_tail(misfit, redundancy) >= false_alarm) return;
+  if (chi_square_tail(misfit, redundancy) >= false_alarm) return;
   const auto& deviations = point.deviations_px;
   const auto worst = std::max_element(deviations.begin(), deviations.end(), [](const auto& a, const auto& b) {
     return a.squaredNorm() < b.squaredNorm();

@@ -15,7 +15,7 @@ namespace zeropose {
 struct Zero {
   Pose X_WO0 = Pose::Identity();
   std::vector<Eigen::Vector3d> compensation_O_mm;  // shift of each mark of the job
-  std::vector<Observation> references{};  // where the reference points were (measure/references.h)
+  std::vector<Observation> references{};           // where the reference points were (measure/references.h)
 };
 
 // The job with its marks where the zero measurement puts them. Precondition: a compensation for each mark.

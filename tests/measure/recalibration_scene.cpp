@@ -133,7 +133,7 @@ std::vector<FixedPoint> plate(const std::string& group, double u_px, double v_px
     const double angle = 2 * std::numbers::pi * k / points;
     // A radius that gives three points `size_mm` apart.
     const Vector3d p_G = size_mm / std::sqrt(3.0) * Vector3d(std::cos(angle), std::sin(angle), 0);
-    corners.push_back({"P" + std::to_string(k + 1), group, X_CoG * p_G, p_G});
+    corners.push_back({std::string("P").append(std::to_string(k + 1)), group, X_CoG * p_G, p_G});
   }
   return corners;
 }

@@ -38,7 +38,7 @@ Vector6 errors_of(const KnockedCamera& camera, Method method, double sigma_px) {
   int refused = 0;
   for (int trial = 0; trial < trials; ++trial) {
     const RecalibrationResult result = camera.recalibrated(method, sigma_px, random);
-    // By chance one in a thousand; plates of three that lie either way at 0.1 px a few in a hundred.
+    // By chance one in a thousand; plates of three whose tilt 0.1 px leaves open more often.
     refused += result.code != Code::ok;
     if (result.code != Code::ok) continue;
     const SixNumbers found = to_six_numbers(result.X_CoCn);
@@ -119,8 +119,9 @@ std::vector<test::FixedPoint> ring_of(int count, double near_mm, double far_mm) 
   std::vector<test::FixedPoint> points;
   for (int k = 0; k < count; ++k) {
     const double angle = 2 * std::numbers::pi * k / count;
-    points.push_back(test::point_at("P" + std::to_string(k + 1), 383.5 + 300 * std::cos(angle),
-                                    285.5 + 220 * std::sin(angle), k % 2 == 0 ? near_mm : far_mm));
+    points.push_back(test::point_at(std::string("P").append(std::to_string(k + 1)),
+                                    383.5 + 300 * std::cos(angle), 285.5 + 220 * std::sin(angle),
+                                    k % 2 == 0 ? near_mm : far_mm));
   }
   return points;
 }

@@ -301,7 +301,7 @@ TEST_F(Degenerate, TooFewPoints) {
 TEST_F(Degenerate, PointsOnALine) {
   std::vector<test::FixedPoint> line;
   for (int i = 0; i < 5; ++i) {
-    line.push_back(test::point_at("P" + std::to_string(i), 384, 286, 2000));
+    line.push_back(test::point_at(std::string("P").append(std::to_string(i)), 384, 286, 2000));
     line.back().p_Co_mm += (i - 2) * Vector3d(70, 20, 150);
   }
   const RecalibrationResult result = solve(Method::known_points, line);

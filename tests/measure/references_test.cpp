@@ -25,12 +25,12 @@ class ReferenceScene {
   explicit ReferenceScene(std::size_t cameras = 1, double sigma_px = 0.02) {
     references_.sigma_px = sigma_px;
     for (std::size_t camera = 0; camera < cameras; ++camera) {
-      cameras_.push_back(
-          {"camera" + std::to_string(camera + 1), test::long_lens(Division{-0.29}), Pose::Identity()});
+      cameras_.push_back({std::string("camera").append(std::to_string(camera + 1)),
+                          test::long_lens(Division{-0.29}), Pose::Identity()});
       for (const auto& [u, v, z] :
            {std::array{110.0, 480.0, 2050.0}, {385.0, 120.0, 2400.0}, {660.0, 470.0, 2750.0}}) {
         ReferencePoint point;
-        point.mark.name = "R" + std::to_string(references_.points.size() + 1);
+        point.mark.name = std::string("R").append(std::to_string(references_.points.size() + 1));
         point.mark.p_O_mm = test::point_at("", u, v, z).p_Co_mm;
         references_.views.push_back({camera, references_.points.size()});
         references_.points.push_back(point);

@@ -141,7 +141,8 @@ TEST(Reliability, KnowsThatNothingChecksThreeMarks) {
   }
 }
 
-// A count is no safety rule: with six marks nearly on a line one of them can move a tool by more than a centimetre.
+// A count is no safety rule: with six marks nearly on a line one of them can move a tool by more than a
+// centimetre.
 TEST(Reliability, SixMarksNearlyOnALineHideMuch) {
   CellScene scene = test::car_body_points();
   scene.job.views.clear();

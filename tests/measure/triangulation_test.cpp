@@ -9,7 +9,7 @@
 #include <limits>
 #include <opencv2/calib3d.hpp>
 
-#include "measure/chi_squared.h"
+#include "calib/chance.h"
 #include "tests/support/poses.h"
 #include "tests/support/synthetic_camera.h"
 
@@ -65,10 +65,10 @@ TEST(ChiSquared, TailIsAsInTables) {
   const double table[][3] = {{3.8415, 1, 0.05},   {5.9915, 2, 0.05},  {7.8147, 3, 0.05},  {9.4877, 4, 0.05},
                              {10.8276, 1, 0.001}, {20.515, 5, 0.001}, {29.588, 10, 0.001}};
   for (const auto& [square, degrees, chance] : table)
-    EXPECT_NEAR(chi_squared_tail(square, static_cast<int>(degrees)), chance, 1e-4 * chance + 1e-6);
-  EXPECT_DOUBLE_EQ(chi_squared_tail(0, 1), 1);
-  EXPECT_DOUBLE_EQ(chi_squared_tail(0, 6), 1);
-  EXPECT_DOUBLE_EQ(chi_squared_tail(1e6, 7), 0);
+    EXPECT_NEAR(chi_square_tail(square, static_cast<int>(degrees)), chance, 1e-4 * chance + 1e-6);
+  EXPECT_DOUBLE_EQ(chi_square_tail(0, 1), 1);
+  EXPECT_DOUBLE_EQ(chi_square_tail(0, 6), 1);
+  EXPECT_DOUBLE_EQ(chi_square_tail(1e6, 7), 0);
 }
 
 TEST(Triangulation, OfExactPixelsIsExact) {
