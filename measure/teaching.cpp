@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calib/words.h"
 #include "calib/chance.h"
+#include "calib/words.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {

@@ -111,7 +111,9 @@ TEST_F(LineChecks, ZeroOfOtherFilesIsOutdated) {
     return daemon_says("status")["zero_state"];
   };
   EXPECT_EQ(line.stop_daemon(), 0);
-  cell.change("car-body.calibration.json", [](Json& json) { json["camera1"]["X_WC"][0] = 1.0; });
+  cell.change("car-body.calibration.json", [](Json& json) {
+    json["camera1"]["X_WC"][0] = json["camera1"]["X_WC"][0].get<double>() + 0.5;
+  });
   Json zero = restarted();
   EXPECT_EQ(zero["code"], static_cast<int>(Code::zero_outdated));
   EXPECT_THAT(zero["reason"].get<std::string>(), HasSubstr("was made with another calibration"));

@@ -24,7 +24,7 @@ class Plan(Case):
     def test_noise_counts(self):
         _, good, _ = run_json("plan", "--cell", CELL)
         status, bad, _ = run_json("plan", "--cell", CELL, "--sigma-px", "5")
-        self.assertEqual((status, bad["status"], bad["code"]), (1, "failed", 404))
+        self.assertEqual((status, bad["status"], bad["code"]), (1, "failed", 405))
         self.assertGreater(bad["sigma_mm"], 10 * good["sigma_mm"])
 
     def test_text_names_all_there_is(self):
