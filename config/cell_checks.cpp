@@ -171,7 +171,9 @@ void put_references_in_place(Cell& cell, JsonReading& reading) {
         continue;
       }
       point.mark.p_O_mm = camera.X_WC * (taught_distance_mm * *direction);
-      point.mark.radius_mm = point.taught_diameter_px / 2 * taught_distance_mm / camera.model.fx_px;
+      const double radius_mm = point.taught_diameter_px / 2 * taught_distance_mm / camera.model.fx_px;
+      for (double& inner_mm : point.mark.inner_radii_mm) inner_mm *= radius_mm / point.mark.radius_mm;
+      point.mark.radius_mm = radius_mm;
       continue;
     }
     const auto u_px = project(camera.model, camera.X_WC.inverse() * point.mark.p_O_mm);

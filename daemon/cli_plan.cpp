@@ -17,7 +17,8 @@ constexpr const char* plan_help =
     R"(Nothing is measured: the object stands in its nominal pose and every mark in an image is found with --sigma-px;
 the job's system_sigma_px and the marks' sigma_mm are added. For each application point the standard deviation of the
 result there; the motions of the object that the marks tell worst; for each mark the smallest error that is sure to
-be found (99 %) and what a smaller one could do at an application point; for each camera what is left without it.
+be found (99 %) and what a smaller one could do at an application point; for each camera what is left without it, and
+how well its pose is found again from its reference points with known coordinates after it was moved.
 A mark that nothing checks is a reason for another one near it.
 Example:
   zeropose plan --cell config/cells/car-body.json
@@ -70,6 +71,13 @@ Json view_json(const Cell& cell, const Job& job, const PlannedView& planned) {
   return json;
 }
 
+Json recovery_json(const PlannedRecovery& recovery) {
+  return {{"points", recovery.points},
+          {"reason", recovery.reason},
+          {"sigma_mm", finite(recovery.sigma_mm)},
+          {"sigma_deg", finite(recovery.sigma_deg)}};
+}
+
 Json camera_json(const Cell& cell, const PlannedCamera& planned) {
   return {{"camera", cell.calibration[planned.camera].name},
           {"marks", planned.marks},
@@ -77,7 +85,8 @@ Json camera_json(const Cell& cell, const PlannedCamera& planned) {
           {"without",
            {{"verdict", verdict_json(planned.loss.verdict)},
             {"sigma_mm", finite(planned.loss.sigma_mm)},
-            {"hidden_mm", finite(planned.loss.hidden_mm)}}}};
+            {"hidden_mm", finite(planned.loss.hidden_mm)}}},
+          {"references", cell.references.views.empty() ? Json() : recovery_json(planned.recovery)}};
 }
 
 Json plan_json(const Cell& cell, const Job& job, const Plan& plan) {
@@ -161,11 +170,25 @@ void print_cameras(std::ostream& text, const Cell& cell, const Plan& plan) {
   }
 }
 
+void print_recovery(std::ostream& text, const Cell& cell, const Plan& plan) {
+  if (cell.references.views.empty()) return;
+  text << "reference points: how well the pose of a camera that was moved is found again, sigma\n";
+  for (const PlannedCamera& planned : plan.cameras) {
+    const PlannedRecovery& recovery = planned.recovery;
+    text << "  " << cell.calibration[planned.camera].name << ": " << recovery.points << " points, ";
+    if (recovery.reason.empty())
+      text << shown(recovery.sigma_mm, " mm", 3) << ", " << shown(recovery.sigma_deg, " deg", 4) << "\n";
+    else
+      text << "not at all: " << recovery.reason << "\n";
+  }
+}
+
 std::string plan_text(const Cell& cell, const Job& job, const Plan& plan) {
   std::ostringstream text;
   if (!plan.points.empty()) print_pose(text, plan);
   print_views(text, cell, job, plan);
   print_cameras(text, cell, plan);
+  print_recovery(text, cell, plan);
   text << "worst point: sigma " << shown(plan.sigma_mm, " mm", 3) << ", by one wrong mark unnoticed "
        << shown(plan.hidden_mm, " mm", 3) << "\n";
   if (plan.verdict.code != Code::ok)
@@ -177,7 +200,7 @@ std::string plan_text(const Cell& cell, const Job& job, const Plan& plan) {
 Answer plan_of(const Options& options) {
   const Cell cell = load_cell(options.cell);
   const Job& job = job_of(cell, options.job);
-  const Plan result = plan({cell.calibration, job, options.sigma_px});
+  const Plan result = plan({cell.calibration, job, options.sigma_px, &cell.references});
   return {result.verdict.code == Code::ok ? done : no_answer, plan_json(cell, job, result),
           plan_text(cell, job, result)};
 }

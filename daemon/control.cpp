@@ -100,6 +100,25 @@ Json marks_json(const Job& job, const Cell& cell, const Measurement& m) {
   return marks;
 }
 
+// The reference points that were looked for, where they are and where they were at the zero measurement.
+Json references_json(const Cell& cell, const std::optional<ZeroRecord>& zero, const Measurement& m) {
+  Json references = Json::array();
+  for (std::size_t i = 0; i < m.reference_findings.size(); ++i) {
+    const View& view = cell.references.views[i];
+    const MarkFinding& finding = m.reference_findings[i];
+    if (finding.status == MarkStatus::not_searched) continue;
+    Json& json = references.emplace_back(Json{{"camera", cell.cameras[view.camera].name},
+                                              {"point", cell.references.points[view.mark].mark.name},
+                                              {"finding", name_of(finding.status)}});
+    if (finding.status == MarkStatus::found) json["after_px"] = {finding.u_px.x(), finding.u_px.y()};
+    if (!zero) continue;
+    for (const Observation& before : zero->zero.references)
+      if (before.camera == view.camera && before.mark == view.mark)
+        json["before_px"] = {before.u_px.x(), before.u_px.y()};
+  }
+  return references;
+}
+
 Json measure_answer(Cycle& cycle) {
   const MeasureOutcome outcome = cycle.measure_now();
   const Measurement& m = outcome.measurement;
@@ -107,6 +126,7 @@ Json measure_answer(Cycle& cycle) {
   answer["grab_ms"] = milliseconds(outcome.grab);
   answer["compute_ms"] = milliseconds(outcome.compute);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
+  answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
   if (m.code != Code::ok) return answer;
   answer["X_O0O"] = six(m.X_O0O);
   answer["X_WO"] = six(m.pose.X_WO);

@@ -278,6 +278,12 @@ Report Cycle::report_for(const Request& request) {
       return report;
     }
     case CommandKind::zero: {
+      // It would forget the movement. An operator may take one, from the command line.
+      if (std::ranges::find(checks_, CameraStand::moved, &CameraCheck::stand) != checks_.end()) {
+        spdlog::warn("request {}: no zero while a camera counts as moved", request.id);
+        report.code = Code::camera_moved;
+        return report;
+      }
       const auto outcome = take_zero(request.deadline);
       report.code = outcome.code;
       return report;

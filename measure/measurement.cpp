@@ -195,15 +195,22 @@ bool passes(Measurement& measurement, Verdict verdict) {
   return measurement.code == Code::ok;
 }
 
-// M6.7. Precondition: the problem has references.
-bool cameras_stand(Measurement& measurement, const MeasurementProblem& problem) {
+// M6.7.
+void look_at_references(Measurement& measurement, const MeasurementProblem& problem) {
   static const ReferenceTrend none;
+  measurement.references.code = Code::ok;
+  if (problem.references == nullptr) return;
   const References& references = *problem.references;
   measurement.reference_findings = find_references(problem.images, references, problem.cameras);
   measurement.references =
       check_references({references, problem.cameras, problem.zero.references, measurement.reference_findings,
                         problem.reference_trend != nullptr ? *problem.reference_trend : none});
-  return passes(measurement, {measurement.references.code, measurement.references.reason});
+}
+
+// References that are not seen may have the same cause as marks that are not, and those say more about it.
+bool cameras_stand(Measurement& measurement, bool marks_are_found) {
+  const bool later = measurement.references.code == Code::reference_missing && !marks_are_found;
+  return later || passes(measurement, {measurement.references.code, measurement.references.reason});
 }
 
 bool find_all(Measurement& measurement, std::span<const CameraImage> images, const Job& job,
@@ -301,13 +308,15 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
 }
 
 Measurement measure(const MeasurementProblem& problem) {
-  const auto& [images, job, cameras, zero, X_O0O_last, references, reference_trend] = problem;
+  const auto& [images, job, cameras, zero, X_O0O_last, references, trend] = problem;
   Measurement measurement;
   if (!passes(measurement, check_zero(job, zero))) return measurement;
   if (!passes(measurement, check_images(images, job, cameras))) return measurement;
-  if (references != nullptr && !cameras_stand(measurement, problem)) return measurement;
+  look_at_references(measurement, problem);
+  if (!cameras_stand(measurement, false)) return measurement;
   const Job now = compensated(job, zero);
   if (!find_all(measurement, images, now, cameras, zero.X_WO0)) return measurement;
+  if (!cameras_stand(measurement, true)) return measurement;
   if (!estimate_all(measurement, now, cameras, zero.X_WO0)) return measurement;
   measurement.sigma_mm = worst_sigma_mm(now, measurement.pose);
   if (!passes(measurement, check_sigma(now, measurement.pose))) return measurement;

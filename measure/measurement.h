@@ -59,8 +59,9 @@ struct MeasurementProblem {
 };
 
 // Marks, references, pose, security and limits in the order of M6, but for the cameras: one that was moved is
-// the cause of all that follows, so it is asked about before the pose. The first check that fails names the
-// code. Marks are searched around the zero pose and used where the zero measurement's compensation puts them.
+// the cause of all that follows, so it is asked about before the marks; one that sees too few references
+// after them. The first check that fails names the code. Marks are searched around the zero pose and used
+// where the zero measurement's compensation puts them.
 //
 // image_blurred and image_saturated also where the job's requirements on marks fail only because the finder
 // calls marks blurred or saturated: with those they would be met.

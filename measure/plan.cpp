@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "calib/pose_only.h"
 #include "calib/symmetric_eigen.h"
 #include "measure/mark_image.h"
 
@@ -47,10 +48,10 @@ PlannedView planned_view(const PlanProblem& problem, const View& view) {
   if (!sighting.in_front) return planned;
   const CameraModel& camera = problem.cameras[view.camera].model;
   const double px_per_mm = sighting.focal_px / sighting.depth_mm;
-  planned.seen = in_image(camera, sighting.u_px);
   planned.diameter_px = 2 * problem.job.marks[view.mark].radius_mm * px_per_mm;
   planned.border_px = border_px(camera, sighting.u_px) - planned.diameter_px / 2;
   planned.border_mm = planned.border_px / px_per_mm;
+  planned.seen = planned.border_px >= 0;
   return planned;
 }
 
@@ -161,6 +162,28 @@ double covered_share(const PlanProblem& problem, std::span<const PlannedView> vi
   return ((high.min(size - 0.5) - low.max(-0.5)) / size).prod();
 }
 
+PlannedRecovery planned_recovery(const PlanProblem& problem, std::size_t index) {
+  const CalibratedCamera& camera = problem.cameras[index];
+  std::vector<CalibrationPoint> points;
+  for (const View& view : problem.references->views) {
+    const ReferencePoint& reference = problem.references->points[view.mark];
+    if (view.camera != index || reference.taught_px) continue;
+    const auto u_px = project(camera.model, camera.X_WC.inverse() * reference.mark.p_O_mm);
+    if (u_px && in_image(camera.model, *u_px)) points.push_back({reference.mark.p_O_mm, *u_px});
+  }
+  PoseOnlyProblem pose;
+  pose.model = camera.model;
+  pose.points = points;
+  pose.X_WC_near = camera.X_WC;
+  pose.sigma_px = problem.sigma_px;
+  const PoseOnlyResult result = calibrate_pose(pose);
+  PlannedRecovery recovery{static_cast<int>(points.size()), result.reason, infinite, infinite};
+  if (result.status != PoseOnlyStatus::ok) return recovery;
+  recovery.sigma_mm = std::sqrt(result.covariance.topLeftCorner<3, 3>().trace());
+  recovery.sigma_deg = degrees_per_radian * std::sqrt(result.covariance.bottomRightCorner<3, 3>().trace());
+  return recovery;
+}
+
 PlannedCamera planned_camera(const PlanProblem& problem, std::span<const PlannedView> views,
                              std::size_t camera) {
   PlannedCamera planned;
@@ -172,6 +195,7 @@ PlannedCamera planned_camera(const PlanProblem& problem, std::span<const Planned
   planned.covered_share = covered_share(problem, views, camera);
   const Prediction without = predict(problem, views, camera);
   planned.loss = {without.verdict, without.sigma_mm, without.hidden_mm};
+  if (problem.references != nullptr) planned.recovery = planned_recovery(problem, camera);
   return planned;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "measure/job.h"
+#include "measure/references.h"
 #include "measure/reliability.h"
 #include "measure/security.h"
 
@@ -15,7 +16,8 @@ namespace zeropose {
 struct PlanProblem {
   std::span<const CalibratedCamera> cameras;
   const Job& job;
-  double sigma_px = 0.02;  // of a found mark, per axis
+  double sigma_px = 0.02;                  // of a found mark or reference point, per axis
+  const References* references = nullptr;  // none: nothing is said about cameras that were moved
 };
 
 struct PlannedPoint {
@@ -34,7 +36,7 @@ struct PlannedDirection {
 
 struct PlannedView {
   View view;
-  bool seen = false;     // the mark's centre lies in the image
+  bool seen = false;     // the mark lies in the image as a whole
   double border_px = 0;  // from its outline to the border of the image; negative: it reaches beyond
   double border_mm = 0;  // the same at the mark: how far the object may move
   double diameter_px = 0;
@@ -50,11 +52,21 @@ struct PlannedLoss {
   double hidden_mm = 0;
 };
 
+// How well a camera that was moved is found again from the reference points that it sees and whose
+// coordinates are known.
+struct PlannedRecovery {
+  int points = 0;
+  std::string reason;  // why not at all, empty when it is
+  // Of the position and of the rotation, each the root of the sum of its three variances.
+  double sigma_mm = 0, sigma_deg = 0;
+};
+
 struct PlannedCamera {
   std::size_t camera = 0;
   int marks = 0;             // it sees
   double covered_share = 0;  // of the image: the rectangle round its marks
   PlannedLoss loss;
+  PlannedRecovery recovery;
 };
 
 struct Plan {

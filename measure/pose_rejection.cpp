@@ -263,6 +263,10 @@ Rejection accepted(PoseModel& model, const Explanations& found, Estimate& curren
   const Explanation& best = found.all[found.best];
   set_active(model, best.removed, false);
   current = found.model_is_there ? best.estimate : estimate(model, best.estimate.solution.pose);
+  if (!current.ok()) {
+    set_active(model, best.removed, true);
+    return refused(model, current, true, "the marks that are left do not lead to a pose again");
+  }
   Rejection rejection{Code::ok, {}, best.removed, true};
   std::stable_sort(rejection.removed.begin(), rejection.removed.end(),
                    [&model](auto a, auto b) { return model.normalised(a) > model.normalised(b); });

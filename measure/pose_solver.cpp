@@ -65,8 +65,6 @@ class Descent {
     return SolverStatus::not_converged;
   }
 
-  bool model_is_elsewhere() const { return rejected_; }
-
  private:
   bool is_last(double step_mm) const {
     return step_mm < last_step_mm && step_mm * std::min(1.0, step_mm / previous_step_mm_) < next_step_mm;
@@ -80,12 +78,8 @@ class Descent {
     if (other_bends) model_.refresh_bends(next);
     NormalEquations equations;
     const double old_cost = solution_.equations.cost;
-    rejected_ = !model_.linearise(next, equations) || !(equations.cost <= old_cost * (1 + 1e-9) + 1e-12);
-    if (rejected_) {
-      if (!other_bends) return false;
-      rejected_ = !model_.linearise(solution_.pose, solution_.equations);
-      return !rejected_;
-    }
+    if (!model_.linearise(next, equations) || !(equations.cost <= old_cost * (1 + 1e-9) + 1e-12))
+      return other_bends && model_.linearise(solution_.pose, solution_.equations);
     solution_.pose = next;
     solution_.equations = equations;
     return true;
@@ -100,7 +94,6 @@ class Descent {
   Solution& solution_;
   double damping_ = 0;
   double previous_step_mm_ = std::numeric_limits<double>::infinity();
-  bool rejected_ = false;  // the last linearisation was not taken
 };
 
 }  // namespace
@@ -112,7 +105,8 @@ Solution refine(PoseModel& model, const CentredPose& start) {
   if (!model.linearise(start, solution.equations)) return solution;
   Descent descent(model, solution);
   solution.status = descent.run();
-  if (descent.model_is_elsewhere()) model.linearise(solution.pose, solution.equations);
+  // The last step was not linearised again, but deviations are those of where it went.
+  if (!model.linearise(solution.pose, solution.equations)) solution.status = SolverStatus::no_image;
   return solution;
 }
 

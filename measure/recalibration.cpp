@@ -327,7 +327,7 @@ RecalibrationResult by_groups(const RecalibrationProblem& problem) {
   }
   set_rms(true, result);
   judge_precision(nearest_mm, result);
-  if (wrong.removed.empty()) judge_alternatives(fits, result);
+  judge_alternatives(fits, result);
   if (!wrong.agree || !(result.rms_px <= plausible_rms_px)) set_contradiction(problem.points, result);
   return result;
 }

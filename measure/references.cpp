@@ -45,6 +45,13 @@ double squares(const Vector2d& d_px, const Matrix2d& covariance) {
   return d_px.dot(covariance.llt().solve(d_px));
 }
 
+// Was there a frame of the camera? A search that makes no sense is none of a missing frame.
+bool looked_at(std::span<const View> views, std::span<const MarkFinding> findings, std::size_t camera) {
+  for (std::size_t i = 0; i < views.size() && i < findings.size(); ++i)
+    if (views[i].camera == camera && findings[i].status != MarkStatus::not_searched) return true;
+  return false;
+}
+
 // What the check of one camera adds up.
 struct Sums {
   double now = 0, trend = 0, displacement = 0;
@@ -83,7 +90,7 @@ void add_view(const ReferenceProblem& problem, std::size_t index, const Observat
 }
 
 CameraStand stand_of(const References& references, const CameraCheck& check, const Sums& sums) {
-  if (check.seen < std::min(check.expected, 2)) return CameraStand::too_few_seen;
+  if (check.seen < std::min(check.expected, 2) || !std::isfinite(sums.now)) return CameraStand::too_few_seen;
   if (check.chance < moved_chance)
     return check.farthest_px > references.tolerance_px ? CameraStand::moved : CameraStand::suspicious;
   if (sums.trend_views > 0 && chi_square_tail(sums.trend, 2 * sums.trend_views) < suspicious_chance)
@@ -169,10 +176,9 @@ ReferenceZero average_references(const References& references, std::span<const C
   std::string missing;
   for (std::size_t i = 0; i < references.views.size(); ++i) {
     const View& view = references.views[i];
-    const bool looked_at = std::ranges::any_of(frames, [i](const auto& frame) {
-      return i < frame.size() && frame[i].status != MarkStatus::not_searched;
-    });
-    if (!looked_at) continue;
+    const bool has_frames = std::ranges::any_of(
+        frames, [&](const auto& findings) { return looked_at(references.views, findings, view.camera); });
+    if (!has_frames) continue;
     const auto found = findings_of_view(frames, i);
     if (2 * found.size() <= frames.size()) {
       missing += (missing.empty() ? "" : ", ") + name_of(references, cameras, view);
@@ -204,13 +210,14 @@ ReferenceCheck check_references(const ReferenceProblem& problem) {
   result.trend.mean_px.resize(views.size(), Vector2d::Zero());
   result.trend.count.resize(views.size(), 0);
   for (std::size_t camera = 0; camera < problem.cameras.size(); ++camera) {
+    if (!looked_at(views, problem.findings, camera)) continue;
     CameraCheck check;
     check.camera = camera;
     Sums sums;
     const ReferenceTrend before = result.trend;
     for (std::size_t i = 0; i < views.size() && i < problem.findings.size(); ++i) {
       const Observation* zero = views[i].camera == camera ? zero_of(problem.zero, views[i]) : nullptr;
-      if (zero == nullptr || problem.findings[i].status == MarkStatus::not_searched) continue;
+      if (zero == nullptr) continue;
       ++check.expected;
       if (problem.findings[i].status == MarkStatus::found)
         add_view(problem, i, *zero, result.trend, sums, check);
@@ -222,7 +229,7 @@ ReferenceCheck check_references(const ReferenceProblem& problem) {
     }
     check.stand = stand_of(problem.references, check, sums);
     // Where a moved camera saw its references says nothing about how it drifts once it is put back.
-    if (check.stand == CameraStand::moved) result.trend = before;
+    if (check.chance < moved_chance || check.stand == CameraStand::too_few_seen) result.trend = before;
     judge(problem, check, sums, result);
     result.cameras.push_back(std::move(check));
   }

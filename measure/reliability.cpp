@@ -2,8 +2,10 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <map>
 #include <optional>
 
+#include "calib/symmetric_eigen.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -16,6 +18,7 @@ using Matrix23 = Eigen::Matrix<double, 2, 3>;
 using Matrix26 = Eigen::Matrix<double, 2, 6>;
 using Matrix62 = Eigen::Matrix<double, 6, 2>;
 
+constexpr double infinite = std::numeric_limits<double>::infinity();
 // Of the normal distribution: exceeded with a chance of 1 %.
 constexpr double missed_detection = 2.326347874040841;
 // Below this share of an error in its own deviation nothing checks an observation.
@@ -93,42 +96,102 @@ Estimator estimator_of(const PoseProblem& problem, const std::vector<Row>& rows)
 }
 
 // The largest length of A b over all b with b' b = 1.
-double largest_stretch(const Eigen::Matrix<double, 3, 2>& A) {
-  const Matrix2d S = A.transpose() * A;
-  const double half_trace = 0.5 * S.trace();
-  return std::sqrt(half_trace + std::sqrt(std::max(0.0, half_trace * half_trace - S.determinant())));
+double largest_stretch(const Eigen::MatrixXd& A) {
+  return std::sqrt(std::max(0.0, symmetric_eigen(A.transpose() * A).values.maxCoeff()));
+}
+
+// An error b of k numbers: what it does to the pose and to the deviations that show it.
+template <int k>
+struct Fault {
+  using Square = Eigen::Matrix<double, k, k>;
+  Eigen::Matrix<double, 6, k> gain = Eigen::Matrix<double, 6, k>::Zero();  // delta by b
+  Square M = Square::Zero();  // b' M b: the sum of the non-centralities of those deviations
+  int deviations = 0;
+};
+
+// `by_fault`: the derivative of each row's pixel by b.
+template <int k>
+Fault<k> fault_of(std::span<const Row* const> rows, const Estimator& estimator,
+                  const std::vector<Eigen::Matrix<double, 2, k>>& by_fault) {
+  Fault<k> fault;
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    fault.gain += estimator.inverse_N * rows[i]->J.transpose() * rows[i]->P * by_fault[i];
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Row& row = *rows[i];
+    const Matrix2d H = row.J * estimator.inverse_N * row.J.transpose() * row.P;
+    const Matrix2d Q =
+        row.T - H * row.T - row.T * H.transpose() + row.J * estimator.covariance * row.J.transpose();
+    const Eigen::Matrix<double, 2, k> shown = by_fault[i] - row.J * fault.gain;
+    // What nothing checks has neither a deviation nor a variance of it.
+    if (std::abs((Matrix2d::Identity() - H).determinant()) > least_redundancy)
+      fault.M += shown.transpose() * Q.inverse() * shown;
+    ++fault.deviations;
+  }
+  return fault;
+}
+
+struct Hidden {
+  double detectable = infinite, error_mm = infinite;
+  std::size_t worst_point = 0;
+};
+
+template <int k>
+Hidden hidden_by(const Fault<k>& fault, double noncentrality, std::span<const Vector3d> arms_W_mm) {
+  Hidden hidden;
+  const SmallCholesky<k> cholesky(fault.M);
+  if (!fault.M.allFinite() || !cholesky.ok() || cholesky.condition_at_least() > 1e12) return hidden;
+  // Below the sum of what each deviation may hide none of them is sure to be beyond its own.
+  const double largest = noncentrality * std::sqrt(fault.deviations);
+  const SymmetricEigen eigen = symmetric_eigen(fault.M);
+  const Eigen::MatrixXd L = largest * eigen.vectors * eigen.values.cwiseSqrt().cwiseInverse().asDiagonal();
+  const Eigen::MatrixXd delta = fault.gain * L;
+  hidden = {largest_stretch(L), 0, 0};
+  for (std::size_t i = 0; i < arms_W_mm.size(); ++i) {
+    const double error_mm =
+        largest_stretch(delta.topRows<3>() - cross_matrix(arms_W_mm[i]) * delta.bottomRows<3>());
+    if (!(error_mm <= hidden.error_mm)) hidden.error_mm = error_mm, hidden.worst_point = i;
+  }
+  return hidden;
 }
 
 ObservationReliability judge(const Row& row, const Estimator& estimator, double noncentrality,
                              std::span<const Vector3d> arms_W_mm) {
-  constexpr double infinite = std::numeric_limits<double>::infinity();
-  ObservationReliability result{row.observation, 0, infinite, infinite, 0};
-  const Matrix62 gain = estimator.inverse_N * row.J.transpose() * row.P;  // delta by an error of the pixel
-  const Matrix2d H = row.J * gain;
-  const Matrix2d shown = Matrix2d::Identity() - H;
-  result.redundancy = 0.5 * shown.trace();
-  const Matrix2d Q =
-      row.T - H * row.T - row.T * H.transpose() + row.J * estimator.covariance * row.J.transpose();
-  // b' M b is the non-centrality of its normalised deviation when its pixel is off by b.
-  const Matrix2d M = shown.transpose() * Q.inverse() * shown;
-  const SmallCholesky<2> cholesky(M);
-  if (!(std::abs(shown.determinant()) > least_redundancy) || !M.allFinite() || !cholesky.ok()) return result;
-  const Matrix2d inverse_M = cholesky.inverse();
-  const double l11 = std::sqrt(inverse_M(0, 0)), l21 = inverse_M(1, 0) / l11;
-  Matrix2d L;
-  L << l11, 0, l21, std::sqrt(std::max(0.0, inverse_M(1, 1) - l21 * l21));
-  Eigen::Matrix<double, 3, 2> flat = Eigen::Matrix<double, 3, 2>::Zero();
-  flat.topRows<2>() = L;
-  result.detectable_px = noncentrality * largest_stretch(flat);
-  result.hidden_mm = 0;
-  for (std::size_t k = 0; k < arms_W_mm.size(); ++k) {
-    const Matrix62 by_unit = gain * L;
-    const double error_mm =
-        noncentrality *
-        largest_stretch(by_unit.topRows<3>() - cross_matrix(arms_W_mm[k]) * by_unit.bottomRows<3>());
-    if (!(error_mm <= result.hidden_mm)) result.hidden_mm = error_mm, result.worst_point = k;
+  const Row* const rows[] = {&row};
+  const Hidden hidden =
+      hidden_by(fault_of<2>(rows, estimator, {Matrix2d::Identity()}), noncentrality, arms_W_mm);
+  const double own_share = (row.J * estimator.inverse_N * row.J.transpose() * row.P).trace();
+  return {row.observation, 1 - 0.5 * own_share, hidden.detectable, hidden.error_mm, hidden.worst_point};
+}
+
+// Marks that several of the rows show.
+std::vector<MarkReliability> judge_marks(const PoseProblem& problem, const std::vector<Row>& rows,
+                                         const Estimator& estimator, double noncentrality,
+                                         std::span<const Vector3d> arms_W_mm) {
+  std::map<std::size_t, std::vector<const Row*>> by_mark;
+  for (const Row& row : rows) by_mark[problem.observations[row.observation].mark].push_back(&row);
+  std::vector<MarkReliability> marks;
+  for (const auto& [mark, shown_by] : by_mark) {
+    if (shown_by.size() < 2) continue;
+    std::vector<Matrix23> by_place;
+    for (const Row* row : shown_by) by_place.emplace_back(row->J.leftCols<3>());
+    const Hidden hidden = hidden_by(fault_of<3>(shown_by, estimator, by_place), noncentrality, arms_W_mm);
+    marks.push_back({mark, hidden.detectable, hidden.error_mm, hidden.worst_point});
   }
-  return result;
+  return marks;
+}
+
+void find_worst(Reliability& reliability) {
+  for (std::size_t i = 0; i < reliability.observations.size(); ++i)
+    if (!(reliability.observations[i].hidden_mm <= reliability.hidden_mm)) {
+      reliability.hidden_mm = reliability.observations[i].hidden_mm;
+      reliability.worst = i;
+    }
+  for (std::size_t i = 0; i < reliability.marks.size(); ++i)
+    if (!(reliability.marks[i].hidden_mm <= reliability.hidden_mm)) {
+      reliability.hidden_mm = reliability.marks[i].hidden_mm;
+      reliability.worst_is_mark = true;
+      reliability.worst = i;
+    }
 }
 
 }  // namespace
@@ -147,12 +210,9 @@ Reliability reliability_of(const PoseProblem& problem, const PoseResult& pose,
                           (problem.marks[problem.observations[row.observation].mark].p_O_mm - middle_O_mm));
   const Estimator estimator = estimator_of(problem, rows);
   const double noncentrality = critical_deviation(rows.size()) + missed_detection;
-  for (const Row& row : rows) {
-    result.observations.push_back(judge(row, estimator, noncentrality, arms_W_mm));
-    if (result.observations.back().hidden_mm <= result.hidden_mm) continue;
-    result.hidden_mm = result.observations.back().hidden_mm;
-    result.worst = result.observations.size() - 1;
-  }
+  for (const Row& row : rows) result.observations.push_back(judge(row, estimator, noncentrality, arms_W_mm));
+  result.marks = judge_marks(problem, rows, estimator, noncentrality, arms_W_mm);
+  find_worst(result);
   return result;
 }
 

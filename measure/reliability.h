@@ -28,17 +28,30 @@ struct ObservationReliability {
   std::size_t worst_point = 0;  // where
 };
 
+// A mark that several cameras see if it sat in the wrong place.
+struct MarkReliability {
+  std::size_t mark = 0;  // index into the problem's
+  double detectable_mm =
+      0;  // the smallest misplacement that is sure to be found, in the direction that hides best
+  double hidden_mm = 0;  // as above
+  std::size_t worst_point = 0;
+};
+
 struct Reliability {
   std::vector<ObservationReliability> observations;  // those that were used, in the order of the problem
-  double hidden_mm = 0;                              // the largest of them
-  std::size_t worst = 0;                             // index into `observations`: whose it is
+  std::vector<MarkReliability> marks;                // those with several of them
+  double hidden_mm = 0;                              // the largest of all
+  bool worst_is_mark = false;                        // whose it is: index into `marks` or `observations`
+  std::size_t worst = 0;
 };
 
 // For the observations that took part in an estimate, at the estimated pose, with their total covariance
 // (own, the system's, the marks' sigma_mm) and the users' weights. Sure means: found with at least 99 % while
 // good observations raise a false alarm in 0.1 % of the estimates; a deviation of that non-centrality is
 // (critical value + 2.326)^2, since the length of a normal vector is never shorter than its share along its
-// mean. Infinite where the others do not check an observation at all.
+// mean. A mark in the wrong place shows in all of its m observations: while the sum of their non-centralities
+// is below m times that one, none of them may be beyond it. Infinite where the others do not check an
+// observation or a mark at all.
 //   problem  as it was given to estimate_pose(); deviations are reckoned in px whatever its residual
 //   pose     its result, code ok; otherwise there is no observation in what comes back
 //   points   where the error counts, mm in O; none: the marks that were used

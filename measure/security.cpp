@@ -155,17 +155,27 @@ Reliability reliability_of(const Job& job, const PoseProblem& problem, const Pos
 Verdict check_power(const Job& job, const PoseProblem& problem, const Reliability& reliability) {
   const double limit = job.requirements.max_hidden_mm;
   if (limit == 0 || reliability.hidden_mm <= limit) return good();
-  const ObservationReliability& worst = reliability.observations[reliability.worst];
-  const Observation& observation = problem.observations[worst.observation];
-  const std::string whose =
-      "mark " + job.marks[observation.mark].name + " in " + problem.cameras[observation.camera].name;
-  if (!std::isfinite(worst.hidden_mm))
+  std::string whose, by;
+  std::size_t point = 0;
+  if (reliability.worst_is_mark) {
+    const MarkReliability& worst = reliability.marks[reliability.worst];
+    whose = "mark " + job.marks[worst.mark].name;
+    by = " could sit wrong by " + number(worst.detectable_mm) + " mm";
+    point = worst.worst_point;
+  } else {
+    const ObservationReliability& worst = reliability.observations[reliability.worst];
+    const Observation& observation = problem.observations[worst.observation];
+    whose = "mark " + job.marks[observation.mark].name + " in " + problem.cameras[observation.camera].name;
+    by = " could be wrong by " + number(worst.detectable_px) + " px";
+    point = worst.worst_point;
+  }
+  if (!std::isfinite(reliability.hidden_mm))
     return {Code::hidden_error_too_large,
             "nothing checks " + whose + ": were it wrong, nobody would notice; more marks are needed"};
-  return {Code::hidden_error_too_large,
-          whose + " could be wrong by " + number(worst.detectable_px) + " px and move " +
-              points_that_count(job)[worst.worst_point].name + " by " + number(worst.hidden_mm, 3) +
-              " mm without being noticed, allowed are " + number(limit, 3) + " mm"};
+  return {Code::hidden_error_too_large, whose + by + " and move " + points_that_count(job)[point].name +
+                                            " by " + number(reliability.hidden_mm, 3) +
+                                            " mm without being noticed, allowed are " + number(limit, 3) +
+                                            " mm"};
 }
 
 Verdict check_limits(const Requirements& requirements, const Pose& X_O0O) {

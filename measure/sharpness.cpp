@@ -24,8 +24,9 @@ struct Blocks {
 
 Blocks blocks_of(const ImageView& image, const PixelWindow& window) {
   Blocks blocks;
-  blocks.columns = std::max(0, (window.width() - block_px) / step_px + 1);
-  blocks.rows = std::max(0, (window.height() - block_px) / step_px + 1);
+  if (window.width() < block_px || window.height() < block_px) return blocks;
+  blocks.columns = (window.width() - block_px) / step_px + 1;
+  blocks.rows = (window.height() - block_px) / step_px + 1;
   for (int row = 0; row < blocks.rows; ++row)
     for (int column = 0; column < blocks.columns; ++column) {
       double sum = 0;

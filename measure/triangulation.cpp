@@ -7,8 +7,8 @@
 #include <optional>
 #include <set>
 
-#include "calib/words.h"
 #include "calib/chance.h"
+#include "calib/words.h"
 #include "measure/small_cholesky.h"
 
 namespace zeropose {
@@ -244,6 +244,8 @@ TriangulatedPoint triangulate(const TriangulationProblem& problem) {
     return failed(Code::too_few_cameras, "seen by " + number(seen_by.size()) +
                                              (seen_by.size() == 1 ? " camera" : " cameras") +
                                              ", the place of a point needs 2");
+  if (seen_by.size() < problem.observations.size())
+    return failed(Code::marks_invalid, "a camera is given twice for the point");
   const std::vector<SightLine> lines = sight_lines(problem);
   const Parallax parallax = best_parallax(lines);
   const auto start = parallax.sigmas() >= least_parallax_sigmas ? nearest_to_all(lines) : std::nullopt;

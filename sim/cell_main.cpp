@@ -83,7 +83,8 @@ void add_options(CLI::App& app, Options& options) {
       ->required();
   app.add_option("--shift", options.shift, "where the object stands from its nominal pose: x,y,z,rx,ry,rz");
   app.add_option("--fault", options.faults,
-                 "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK");
+                 "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK,\n"
+                 "camera-moved:CAMERA");
   app.add_option("--control", options.control, "Unix socket that moves the object and injects faults");
   auto* drives =
       app.add_flag("--drive", options.drives, "run the robot's program: one shifted car after the other");

@@ -14,7 +14,8 @@ PictureSettings read_picture(JsonObject& object) {
   object.read("mark_grey", picture.mark_grey, {1, 250});
   object.read("illumination_gradient", picture.illumination_gradient, {0, 1});
   object.read("blur_sigma_px", picture.blur_sigma_px, {0.3, 5});
-  object.read("noise_sigma_grey", picture.noise_sigma_grey, {0, 50});
+  object.read("noise_sigma_grey", picture.noise_sigma_grey,
+              {0, 50, true});  // two like pictures are a frozen camera
   object.read("clutter", picture.clutter, 0, 100);
   object.read("seed", seed, 0, std::numeric_limits<int>::max());
   picture.seed = static_cast<std::uint64_t>(seed);

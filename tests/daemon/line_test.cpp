@@ -139,6 +139,15 @@ TEST_F(Line, MovedCameraIsNamedAndPutBackItCountsAgain) {
   EXPECT_THAT(line.zeropose({"status"}).out, HasSubstr("camera2: there, MOVED by its reference points"));
   EXPECT_THAT(line.zeropose({"measure"}).out,
               HasSubstr("the reference points of camera2 are displaced by 3."));
+  const Json measured = line.ask_daemon({{"cmd", "measure"}});
+  ASSERT_EQ(measured["references"].size(), 12u);
+  for (const auto& reference : measured["references"]) {
+    const double moved_px =
+        std::hypot(reference["after_px"][0].get<double>() - reference["before_px"][0].get<double>(),
+                   reference["after_px"][1].get<double>() - reference["before_px"][1].get<double>());
+    EXPECT_EQ(moved_px > 1, reference["camera"] == "camera2") << reference;
+  }
+  EXPECT_EQ(line.robot().zero(1).code, static_cast<int>(Code::camera_moved));  // it would forget the movement
   line.fault("camera-moved", {{"camera", "camera2"}, {"pose", {0.5, 0, 0, 0, 0, 0}}});
   expect_code(Code::camera_moved);
   line.fault("clear");

@@ -19,6 +19,10 @@ class Plan(Case):
         self.assertEqual(plan["sigma_mm"], max(p["sigma_mm"] for p in plan["points"]))
         self.assertEqual(plan["hidden_mm"], max(v["hidden_mm"] for v in plan["views"]))
         self.assertEqual((len(plan["views"]), len(plan["cameras"]), len(plan["weak_directions"])), (12, 4, 6))
+        self.assertTrue(all(camera["references"]["points"] == 3 for camera in plan["cameras"]))
+        # Better than the published differences of three known points to a laser tracker, root of the sum of squares.
+        self.assertTrue(all(camera["references"]["sigma_mm"] < 1.25 for camera in plan["cameras"]))
+        self.assertTrue(all(camera["references"]["sigma_deg"] < 0.021 for camera in plan["cameras"]))
         self.assertTrue(all(camera["without"]["sigma_mm"] > plan["sigma_mm"] for camera in plan["cameras"]))
 
     def test_noise_counts(self):
@@ -30,7 +34,7 @@ class Plan(Case):
     def test_text_names_all_there_is(self):
         status, out, _ = run("plan", "--cell", CELL)
         self.assertEqual(status, 0)
-        for word in ("front left", "camera3 camera3/2", "camera4: 3 marks", "worst point"):
+        for word in ("front left", "camera3 camera3/2", "camera4: 3 marks", "camera2: 3 points", "worst point"):
             self.assertIn(word, out)
 
     def test_a_layout_in_which_nothing_checks_a_mark(self):

@@ -139,5 +139,30 @@ TEST(Plan, SaysHowMuchOfThePictureTheMarksSpan) {
   EXPECT_NEAR(plan_of(scene).cameras.at(0).covered_share, 0.25, 1e-9);
 }
 
+// Five points before the first camera, alternately nearer and farther than 2.5 m by so much.
+PlannedRecovery recovery_of(double depth_mm, double noise_px) {
+  const CellScene scene = test::car_body_points();
+  const CalibratedCamera& camera = scene.cameras[0];
+  References references;
+  const Eigen::Vector2d pixels[] = {{80, 80}, {690, 90}, {380, 290}, {90, 490}, {680, 480}};
+  for (std::size_t i = 0; i < 5; ++i) {
+    const double z_mm = 2500 + (i % 2 == 0 ? depth_mm : -depth_mm);
+    ReferencePoint& point = references.points.emplace_back();
+    point.mark.p_O_mm = camera.X_WC * (z_mm * *ray(camera.model, pixels[i]));
+    references.views.push_back({0, i});
+  }
+  return plan({scene.cameras, scene.job, noise_px, &references}).cameras.at(0).recovery;
+}
+
+TEST(Plan, SaysHowWellAMovedCameraIsFoundAgain) {
+  const PlannedRecovery deep = recovery_of(400, 0.05), noisy = recovery_of(400, 0.1);
+  EXPECT_EQ(deep.points, 5);
+  EXPECT_EQ(deep.reason, "");
+  EXPECT_NEAR(noisy.sigma_mm / deep.sigma_mm, 2, 1e-6);
+  EXPECT_NEAR(noisy.sigma_deg / deep.sigma_deg, 2, 1e-6);
+  EXPECT_GT(recovery_of(20, 0.05).sigma_mm, 10 * deep.sigma_mm);  // it is the depth that tells
+  EXPECT_EQ(plan_of(test::car_body()).cameras.at(0).recovery.points, 0);
+}
+
 }  // namespace
 }  // namespace zeropose

@@ -170,6 +170,68 @@ TEST(Reliability, SixMarksNearlyOnALineHideMuch) {
   EXPECT_NE(verdict.reason.find("mm"), std::string::npos);
 }
 
+// Three marks in two cameras: every pixel is checked by the other camera, but nothing says that a mark sits
+// wrong.
+TEST(Reliability, KnowsThatCamerasDoNotCheckWhereAMarkSits) {
+  CellScene scene = test::car_body_points();
+  scene.cameras.resize(2);
+  scene.job.marks.resize(3);
+  scene.job.views.clear();
+  const Eigen::Vector3d corners[] = {{0, 0, 0}, {500, 0, 0}, {0, 500, 0}};
+  for (std::size_t i = 0; i < 2; ++i) {
+    scene.cameras[i].model = {1280, 1024, 2500, 2500, 639.5, 511.5, Division{0}};
+    scene.cameras[i].X_WC =
+        from_six_numbers({i == 0 ? -700.0 : 700.0, 0, -1500, 0, i == 0 ? 20.0 : -20.0, 0});
+    for (std::size_t mark = 0; mark < 3; ++mark) {
+      scene.job.marks[mark].p_O_mm = corners[mark];
+      scene.job.views.push_back({i, mark});
+    }
+  }
+  auto observations = exact_pixels(scene);
+  const Reliability unchecked = reliability(scene, observations);
+  ASSERT_EQ(unchecked.marks.size(), 3u);
+  for (const ObservationReliability& one : unchecked.observations) EXPECT_TRUE(std::isfinite(one.hidden_mm));
+  EXPECT_TRUE(unchecked.worst_is_mark);
+  EXPECT_GT(unchecked.hidden_mm, 100);
+  // With four marks a misplaced one bends what was a plane.
+  scene.job.marks.push_back(scene.job.marks[0]);
+  scene.job.marks[3].p_O_mm = {500, 500, 100};
+  scene.job.views.push_back({0, 3});
+  scene.job.views.push_back({1, 3});
+  const Reliability checked = reliability(scene, exact_pixels(scene));
+  EXPECT_LT(checked.hidden_mm, unchecked.hidden_mm);
+}
+
+// Against brute force: a mark is moved, all of its pixels with it, until one deviation is sure to be found.
+TEST(Reliability, OfAMarkIsNotBelowWhatMovingItDoes) {
+  CellScene scene = test::car_body_points();
+  for (std::size_t i = 0; i < 4; ++i) {
+    CalibratedCamera second = scene.cameras[i];
+    second.X_WC.translation() += 600 * second.X_WC.linear().col(0);
+    scene.cameras.push_back(second);
+    for (std::size_t mark = 3 * i; mark < 3 * i + 3; ++mark) scene.job.views.push_back({4 + i, mark});
+  }
+  const auto observations = exact_pixels(scene);
+  ASSERT_EQ(observations.size(), 24u);
+  const Reliability reckoned = reliability(scene, observations);
+  ASSERT_EQ(reckoned.marks.size(), 12u);
+  const Pose X_WO = estimate_pose(problem_of(scene, observations)).X_WO;
+  const double sure = critical_deviation(24) + 2.3263478740408408;
+  test::Random random(4);
+  for (int trial = 0; trial < 60; ++trial) {
+    const std::size_t mark = static_cast<std::size_t>(trial) % 12;
+    CellScene bent = scene;
+    bent.job.marks[mark].p_O_mm += 0.1 * test::uniform_vector(random, 1).normalized();
+    const auto moved_pixels = exact_pixels(bent);
+    const PoseResult result = estimate_pose(problem_of(scene, moved_pixels));
+    double shown = 0;
+    for (std::size_t i = 0; i < moved_pixels.size(); ++i)
+      if (moved_pixels[i].mark == mark) shown = std::max(shown, result.deviations[i].normalised);
+    const double hidden_mm = sure / shown * largest_shift_mm(scene, X_WO, result.X_WO);
+    EXPECT_LE(hidden_mm, 1.01 * reckoned.marks[mark].hidden_mm);
+  }
+}
+
 TEST(Reliability, OfASheetCountsItsThreeDirections) {
   CellScene scene = test::car_body_points();
   const auto observations = exact_pixels(scene);

@@ -268,6 +268,9 @@ TEST(Triangulation, NeedsTwoCameras) {
   observations[1] = observations[0];  // one camera twice
   expect_refused(triangulate({cameras, observations}), Code::too_few_cameras, "seen by 1");
   expect_refused(triangulate({cameras, {}}), Code::too_few_cameras, "seen by 0");
+  auto again = seen(cameras, {30, 0, 1000});
+  again.push_back(again[0]);
+  expect_refused(triangulate({cameras, again}), Code::marks_invalid, "twice");
 }
 
 TEST(Triangulation, RefusesRaysThatAreParallelWithinTheirNoise) {
