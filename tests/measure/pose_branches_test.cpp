@@ -37,9 +37,8 @@ struct MonoScene {
     observations = test::observe(scene.cameras, scene.job, X_WO, sigma_px, random);
   }
 
-  PoseResult estimate(std::optional<Pose> start = std::nullopt) const {
-    return test::estimate(scene, observations, start);
-  }
+  PoseResult estimate() const { return test::estimate(scene, observations, std::nullopt); }
+  PoseResult estimate(const Pose& start) const { return test::estimate(scene, observations, start); }
   double squares_px2(const Pose& pose) const {
     double sum = 0;
     for (const Observation& seen : observations) {
