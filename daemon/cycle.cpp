@@ -29,37 +29,6 @@ std::vector<CameraImage> images_of(std::span<const std::size_t> cameras, std::sp
   return images;
 }
 
-struct Failure {
-  Code code = Code::ok;
-  std::string reason;
-};
-
-// Moves the frames out when all are there; else the code of the first camera that failed and the reasons of
-// all.
-Failure take_frames(std::vector<GrabResult>& results, std::vector<Frame>& frames) {
-  Failure failure;
-  for (auto& result : results) {
-    if (result.status == GrabStatus::ok) {
-      frames.push_back(std::move(result.frame));
-      continue;
-    }
-    if (failure.code == Code::ok) failure.code = code_of(result.status);
-    failure.reason += (failure.reason.empty() ? "" : "; ") + result.reason;
-  }
-  if (failure.code != Code::ok) frames.clear();
-  return failure;
-}
-
-// As take_frames(), and a camera that repeats its picture fails as well.
-Failure take_live_frames(std::span<const std::size_t> cameras, std::vector<GrabResult>& results,
-                         FrozenPictures& pictures, std::vector<Frame>& frames) {
-  Failure failure = take_frames(results, frames);
-  for (std::size_t i = 0; i < frames.size(); ++i)
-    if (pictures.repeats(cameras[i], frames[i]) && failure.code == Code::ok)
-      failure = {Code::frame_frozen, frames[i].camera + " delivered the same picture as before, bit for bit"};
-  return failure;
-}
-
 // Where the robot's base stands as the request says. Without an axis the argument means nothing.
 Pose base_of(const RobotOptions& robot, const Request& request) {
   constexpr double mm_per_um = 1e-3;
@@ -86,10 +55,7 @@ ImageView view_of(const Frame& frame) {
 }
 
 Cycle::Cycle(Cell cell, std::filesystem::path state)
-    : cell_(std::move(cell)),
-      state_(std::move(state)),
-      grabber_(cell_.cameras),
-      pictures_(cell_.cameras.size()) {
+    : cell_(std::move(cell)), state_(std::move(state)), grabber_(cell_.cameras) {
   forget_checks();
   load_zeros();
 }
@@ -189,8 +155,7 @@ void Cycle::refresh() {
     return now.cameras[i].state == CameraState::alive;
   });
   cell.zero_valid = now.zero.has_value();
-  cell.camera_moved = std::any_of(checks_.begin(), checks_.end(),
-                                  [](const CameraCheck& check) { return check.stand == CameraStand::moved; });
+  cell.camera_moved = a_camera_moved();
   cell.simulated = cell_.simulated;
   cell.config_hash = cell_.config_hash;
   cell.calibration_hash = cell_.calibration_hash;
@@ -208,6 +173,10 @@ void Cycle::refresh() {
 void Cycle::forget_checks() {
   trend_ = {};
   checks_.assign(cell_.cameras.size(), {});
+}
+
+bool Cycle::a_camera_moved() const {
+  return std::ranges::find(checks_, CameraStand::moved, &CameraCheck::stand) != checks_.end();
 }
 
 void Cycle::remember(const ReferenceCheck& check) {
@@ -279,7 +248,7 @@ Report Cycle::report_for(const Request& request) {
     }
     case CommandKind::zero: {
       // It would forget the movement. An operator may take one, from the command line.
-      if (std::ranges::find(checks_, CameraStand::moved, &CameraCheck::stand) != checks_.end()) {
+      if (a_camera_moved()) {
         spdlog::warn("request {}: no zero while a camera counts as moved", request.id);
         report.code = Code::camera_moved;
         return report;
@@ -321,21 +290,21 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
   }
   const auto cameras = cameras_of(job);
   const auto start = Clock::now();
-  auto results = grabber_.grab(cameras, deadline - compute_reserve);
-  const auto grabbed = Clock::now();
-  outcome.grab = grabbed - start;
-  if (const Failure failure = take_live_frames(cameras, results, pictures_, outcome.frames);
-      failure.code != Code::ok) {
-    m.code = failure.code;
-    m.reason = failure.reason;
+  FrameSet grabbed = grabber_.grab_live(cameras, deadline - compute_reserve);
+  const auto computing = Clock::now();
+  outcome.grab = computing - start;
+  if (grabbed.code != Code::ok) {
+    m.code = grabbed.code;
+    m.reason = std::move(grabbed.reason);
     return outcome;
   }
+  outcome.frames = std::move(grabbed.frames);
   on_exposed();
   const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
   m = zeropose::measure({images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero, X_O0O_last_,
                          references, &trend_});
   remember(m.references);
-  outcome.compute = Clock::now() - grabbed;
+  outcome.compute = Clock::now() - computing;
   return outcome;
 }
 
@@ -346,16 +315,13 @@ ZeroOutcome Cycle::take_zero(TimePoint deadline) {
   std::vector<std::vector<MarkFinding>> references;
   for (int i = 0; i < cell_.zero_frames; ++i) {
     last_progress_ = Clock::now();
-    std::vector<Frame> frames;
-    auto results =
-        grabber_.grab(cameras, std::min(deadline - compute_reserve, Clock::now() + cell_.deadline));
-    if (const Failure failure = take_live_frames(cameras, results, pictures_, frames);
-        failure.code != Code::ok)
-      return {failure.code, failure.reason, {}, Vector6::Zero()};
-    const auto findings =
-        find_job_marks(images_of(cameras, frames), job, cell_.calibration, job.X_WO_nominal);
+    const FrameSet grabbed =
+        grabber_.grab_live(cameras, std::min(deadline - compute_reserve, Clock::now() + cell_.deadline));
+    if (grabbed.code != Code::ok) return {grabbed.code, grabbed.reason, {}, Vector6::Zero()};
+    const auto images = images_of(cameras, grabbed.frames);
+    const auto findings = find_job_marks(images, job, cell_.calibration, job.X_WO_nominal);
     observations.push_back(observations_of(findings, job));
-    references.push_back(find_references(images_of(cameras, frames), cell_.references, cell_.calibration));
+    references.push_back(find_references(images, cell_.references, cell_.calibration));
   }
   ZeroResult result = make_zero(cell_.calibration, job, observations);
   if (result.code == Code::ok) {

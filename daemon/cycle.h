@@ -13,7 +13,6 @@
 
 #include "config/cell.h"
 #include "config/records.h"
-#include "daemon/frozen_pictures.h"
 #include "daemon/grab.h"
 #include "daemon/overlay.h"
 #include "measure/measurement.h"
@@ -106,6 +105,7 @@ class Cycle {
   void keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome);
   Snapshot snapshot(std::size_t camera);
   void remember(const ReferenceCheck& check);
+  bool a_camera_moved() const;
   void forget_checks();  // with a new zero or another job
   void load_zeros();
 
@@ -113,7 +113,6 @@ class Cycle {
   const std::filesystem::path state_;
   std::vector<RobotLink*> links_;
   Grabber grabber_;
-  FrozenPictures pictures_;
 
   // Only the cycle thread touches these once it runs.
   std::size_t selected_ = 0;       // job

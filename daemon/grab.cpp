@@ -18,7 +18,7 @@ Code code_of(GrabStatus status) {
   return Code::internal;
 }
 
-Grabber::Grabber(const std::vector<CameraOptions>& cameras) {
+Grabber::Grabber(const std::vector<CameraOptions>& cameras) : pictures_(cameras.size()) {
   for (const auto& camera : cameras) workers_.push_back(std::make_unique<CameraWorker>(camera));
 }
 
@@ -32,6 +32,25 @@ std::vector<GrabResult> Grabber::grab(std::span<const std::size_t> cameras, Time
   std::vector<GrabResult> results;
   for (auto& request : pending) results.push_back(request.wait());
   return results;
+}
+
+FrameSet Grabber::grab_live(std::span<const std::size_t> cameras, TimePoint deadline) {
+  FrameSet set;
+  set.code = Code::ok;
+  const auto fail = [&set](Code code, const std::string& reason) {
+    if (set.code == Code::ok) set.code = code;
+    set.reason += (set.reason.empty() ? "" : "; ") + reason;
+  };
+  for (GrabResult& result : grab(cameras, deadline)) {
+    if (result.status != GrabStatus::ok) fail(code_of(result.status), result.reason);
+    set.frames.push_back(std::move(result.frame));
+  }
+  if (set.code == Code::ok)
+    for (std::size_t i = 0; i < cameras.size(); ++i)
+      if (pictures_.repeats(cameras[i], set.frames[i]))
+        fail(Code::frame_frozen, set.frames[i].camera + " delivered the same picture as before, bit for bit");
+  if (set.code != Code::ok) set.frames.clear();
+  return set;
 }
 
 }  // namespace zeropose

@@ -3,14 +3,23 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <vector>
 
+#include "daemon/frozen_pictures.h"
 #include "drivers/camera_worker.h"
 #include "measure/code.h"
 
 namespace zeropose {
 
 Code code_of(GrabStatus status);
+
+// The frames of all cameras wanted, in their order, or none.
+struct FrameSet {
+  Code code = Code::internal;  // of the first camera that failed
+  std::string reason;          // of all that did
+  std::vector<Frame> frames;
+};
 
 class Grabber {
  public:
@@ -20,11 +29,15 @@ class Grabber {
   // Triggers all at once and waits for all. In the order of the indices; the answer is there at the deadline.
   std::vector<GrabResult> grab(std::span<const std::size_t> cameras, TimePoint deadline);
 
+  // The same; a camera that repeats its picture fails as well.
+  FrameSet grab_live(std::span<const std::size_t> cameras, TimePoint deadline);
+
   std::size_t size() const { return workers_.size(); }
   const CameraWorker& camera(std::size_t index) const { return *workers_[index]; }
 
  private:
   std::vector<std::unique_ptr<CameraWorker>> workers_;
+  FrozenPictures pictures_;
 };
 
 }  // namespace zeropose

@@ -111,12 +111,9 @@ Prediction predict(const PlanProblem& problem, std::span<const PlannedView> view
 
 std::vector<PlannedPoint> planned_points(const Job& job, const PoseResult& pose) {
   std::vector<PlannedPoint> points;
-  for (const ApplicationPoint& point : points_that_count(job)) {
-    Eigen::Matrix<double, 3, 6> J;
-    J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.X_WO.linear() * point.p_O_mm);
-    const Eigen::Matrix3d covariance = J * pose.total_covariance * J.transpose();
-    points.push_back({point.name, sigma_at_mm(pose, point.p_O_mm), covariance.diagonal().cwiseSqrt()});
-  }
+  for (const ApplicationPoint& point : points_that_count(job))
+    points.push_back({point.name, sigma_at_mm(pose, point.p_O_mm),
+                      covariance_at_mm2(pose, point.p_O_mm).diagonal().cwiseSqrt()});
   return points;
 }
 

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "calib/symmetric_eigen.h"
-#include "measure/small_cholesky.h"
 
 namespace zeropose {
 namespace {
@@ -23,6 +22,8 @@ constexpr double infinite = std::numeric_limits<double>::infinity();
 constexpr double missed_detection = 2.326347874040841;
 // Below this share of an error in its own deviation nothing checks an observation.
 constexpr double least_redundancy = 1e-6;
+// Of the best checked direction of an error: one that is checked less is not checked.
+constexpr double least_share = 1e-12;
 
 // An observation at the estimated pose. The delta is that of moved() with the rotation about M, the middle of
 // the marks.
@@ -138,11 +139,11 @@ struct Hidden {
 template <int k>
 Hidden hidden_by(const Fault<k>& fault, double noncentrality, std::span<const Vector3d> arms_W_mm) {
   Hidden hidden;
-  const SmallCholesky<k> cholesky(fault.M);
-  if (!fault.M.allFinite() || !cholesky.ok() || cholesky.condition_at_least() > 1e12) return hidden;
+  if (!fault.M.allFinite()) return hidden;
+  const SymmetricEigen eigen = symmetric_eigen(fault.M);
+  if (!(eigen.values(0) > least_share * eigen.values(k - 1))) return hidden;
   // Below the sum of what each deviation may hide none of them is sure to be beyond its own.
   const double largest = noncentrality * std::sqrt(fault.deviations);
-  const SymmetricEigen eigen = symmetric_eigen(fault.M);
   const Eigen::MatrixXd L = largest * eigen.vectors * eigen.values.cwiseSqrt().cwiseInverse().asDiagonal();
   const Eigen::MatrixXd delta = fault.gain * L;
   hidden = {largest_stretch(L), 0, 0};

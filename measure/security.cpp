@@ -129,10 +129,14 @@ std::vector<ApplicationPoint> points_that_count(const Job& job) {
   return points;
 }
 
-double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
+Eigen::Matrix3d covariance_at_mm2(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
   Eigen::Matrix<double, 3, 6> J;
   J << Eigen::Matrix3d::Identity(), -cross_matrix(pose.X_WO.linear() * p_O_mm);
-  return std::sqrt(symmetric_eigen(J * pose.total_covariance * J.transpose()).values.maxCoeff());
+  return J * pose.total_covariance * J.transpose();
+}
+
+double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm) {
+  return std::sqrt(symmetric_eigen(covariance_at_mm2(pose, p_O_mm)).values.maxCoeff());
 }
 
 double worst_sigma_mm(const Job& job, const PoseResult& pose) { return worst_sigma(job, pose).value_mm; }

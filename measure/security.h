@@ -30,8 +30,10 @@ Verdict check_marks(const Job& job, std::span<const CalibratedCamera> cameras, s
 // The application points of a job; without any, its marks.
 std::vector<ApplicationPoint> points_that_count(const Job& job);
 
-// Sigma, mm, of a pose's error at a point of the object, in the direction in which it is largest. From the
-// total covariance.
+// Covariance of a pose's error at a point of the object, mm^2, axes of W. From the total covariance.
+Eigen::Matrix3d covariance_at_mm2(const PoseResult& pose, const Eigen::Vector3d& p_O_mm);
+
+// Its sigma, mm, in the direction in which it is largest.
 double sigma_at_mm(const PoseResult& pose, const Eigen::Vector3d& p_O_mm);
 
 // The largest of them over the points that count.
