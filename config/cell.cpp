@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "config/camera_options.h"
 #include "config/cameras.h"
 #include "config/cell_checks.h"
 #include "config/files.h"
@@ -16,7 +17,6 @@ namespace zeropose {
 namespace {
 
 constexpr double largest_mm = 1e6;
-constexpr std::array<std::string_view, 1> driver_names{"gige"};
 // In pairs of one kind, dark and bright.
 constexpr std::array<std::string_view, 10> mark_kind_names{
     "dark_disc",   "bright_disc", "dark_ring",   "bright_ring", "dark_ball",
@@ -26,15 +26,6 @@ constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring, MarkKind::ball, 
 constexpr std::array<std::string_view, 1> link_names{"modbus-tcp"};
 constexpr std::array<std::string_view, 4> frame_names{"object_zero", "world_shift", "robot_base_shift",
                                                       "user_frame"};
-
-void read_address(JsonObject& object, std::string_view key, std::string& address) {
-  std::string text;
-  if (!object.read(key, text)) return;
-  if (is_ipv4(text))
-    address = text;
-  else
-    object.add_mistake(key, in_quotes(text), "an IPv4 address such as 192.168.10.11");
-}
 
 void read_addresses(JsonObject& object, std::string_view key, std::vector<std::string>& addresses) {
   if (!object.read_optional(key, addresses)) return;
@@ -48,21 +39,6 @@ void read_milliseconds(JsonObject& object, std::string_view key, std::chrono::mi
                        int max) {
   int count = static_cast<int>(value.count());
   if (object.read_optional(key, count, min, max)) value = std::chrono::milliseconds(count);
-}
-
-CameraOptions read_camera_options(JsonObject& object) {
-  CameraOptions camera;
-  std::size_t driver = 0;
-  object.read("name", camera.name);
-  object.read_word("driver", driver_names, driver);
-  read_address(object, "address", camera.address);
-  object.read("width_px", camera.width_px, 1, 65535);
-  object.read("height_px", camera.height_px, 1, 65535);
-  double exposure_us = 0, gain = 0;
-  if (object.read_optional("exposure_us", exposure_us, NumberRange{0, 1e7, true}))
-    camera.exposure_us = exposure_us;
-  if (object.read_optional("gain", gain, NumberRange{0, 1000})) camera.gain = gain;
-  return camera;
 }
 
 // A direction of length 1 within 1 %, then exactly 1.
@@ -374,6 +350,8 @@ Cell load_cell(const std::filesystem::path& path) {
     }
   }
   if (!mistakes.empty()) throw ConfigError(std::move(mistakes));
+  for (CameraOptions& camera : cell.cameras)
+    if (camera.driver == CameraDriver::folder) camera.folder.path = path.parent_path() / camera.folder.path;
   return cell;
 }
 

@@ -33,9 +33,13 @@ const auto name_in_quotes = [](const auto& element) {
 
 void check_cameras(const Cell& cell, JsonReading& reading) {
   check_unique(cell.cameras, "cameras", "name", name_in_quotes, reading);
-  check_unique(
-      cell.cameras, "cameras", "address", [](const CameraOptions& camera) { return camera.address; },
-      reading);
+  const auto unique = [&](const std::string& key, auto member) {
+    check_unique(cell.cameras, "cameras", key, member, reading);
+  };
+  unique("address", [](const CameraOptions& camera) { return camera.gige.address; });
+  unique("serial", [](const CameraOptions& camera) { return camera.gige.serial; });
+  unique("user_name", [](const CameraOptions& camera) { return camera.gige.user_name; });
+  unique("device", [](const CameraOptions& camera) { return camera.v4l2.device; });
 }
 
 // How many marks of a weight above 0 each camera of the job sees.

@@ -34,7 +34,7 @@ std::string summary_of(const Cell& cell) {
   std::ostringstream text;
   text << "OK: cell " << cell.name << (cell.simulated ? " (simulated)" : "") << "\n";
   for (const CameraOptions& camera : cell.cameras)
-    text << "  camera " << camera.name << " at " << camera.address << ", " << camera.width_px << " x "
+    text << "  camera " << camera.name << " at " << place_of(camera) << ", " << camera.width_px << " x "
          << camera.height_px << " px\n";
   for (const Job& job : cell.jobs)
     text << "  job " << job.number << " " << job.name << ": " << job.marks.size() << " marks, "

@@ -51,7 +51,7 @@ std::string hex(std::uint32_t number) { return fmt::format("{:08x}", number); }
 }  // namespace
 
 ImageView view_of(const Frame& frame) {
-  return {frame.pixels.data(), frame.width_px, frame.height_px, frame.width_px};
+  return {frame.pixels.get(), frame.width_px, frame.height_px, frame.stride_bytes, frame.white};
 }
 
 Cycle::Cycle(Cell cell, std::filesystem::path state)

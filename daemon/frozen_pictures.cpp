@@ -10,8 +10,8 @@ constexpr int row_step = 16;  // the rows between cost time and tell nothing new
 std::vector<std::uint8_t> rows_of(const Frame& frame) {
   std::vector<std::uint8_t> rows;
   for (int v = 0; v < frame.height_px; v += row_step) {
-    const auto start = frame.pixels.begin() + std::ptrdiff_t{v} * frame.width_px;
-    rows.insert(rows.end(), start, start + frame.width_px);
+    const auto row = frame.row(v);
+    rows.insert(rows.end(), row.begin(), row.end());
   }
   return rows;
 }

@@ -2,18 +2,22 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "drivers/camera_options.h"
 
 namespace zeropose {
 
 using TimePoint = std::chrono::steady_clock::time_point;
 
-// A frame with its identity and times. Owns its pixels: 8-bit grey, row by row, without padding.
+// A frame with its identity and times. Copies share the pixels: nobody may change them.
 struct Frame {
   std::string camera;
   std::uint64_t sequence = 0;        // counted by the driver from 1 for each opening of the device
@@ -21,15 +25,16 @@ struct Frame {
   TimePoint triggered;               // host, monotonic: when the trigger was sent
   TimePoint received;                // host, monotonic: when the last byte was there
   int width_px = 0, height_px = 0;
-  std::vector<std::uint8_t> pixels;
+  int white = 255;  // the highest grey value; above 255 each pixel has two bytes in the host's order
+  std::ptrdiff_t stride_bytes = 0;             // from one row to the next
+  std::shared_ptr<const std::uint8_t> pixels;  // the first one; whoever lets go last gives the memory back
+
+  std::size_t row_bytes() const { return static_cast<std::size_t>(width_px) * (white > 255 ? 2 : 1); }
+  std::span<const std::uint8_t> row(int v) const { return {pixels.get() + v * stride_bytes, row_bytes()}; }
 };
 
-struct CameraOptions {
-  std::string name;     // as in the cell
-  std::string address;  // IPv4 address of a GigE Vision camera
-  int width_px = 0, height_px = 0;
-  std::optional<double> exposure_us = {}, gain = {};
-};
+// Pixels that belong to nobody else, for Frame::pixels.
+std::shared_ptr<const std::uint8_t> own_pixels(std::vector<std::uint8_t> pixels);
 
 // What a device did wrong. Missing: it cannot be reached, or no longer; open it anew. In use: by another
 // program, or by one that died less than a heartbeat (3 s) ago. After the others it goes on, the frame is

@@ -74,8 +74,7 @@ GrabResult CameraWorker::Pending::wait() {
     if (request_->result) return std::move(*request_->result);
   }
   if (worker_->state() != CameraState::alive) return refusal(GrabStatus::missing, worker_->last_problem());
-  return refusal(GrabStatus::timeout, "camera " + worker_->camera_.name + " (" + worker_->camera_.address +
-                                          "): no frame by the deadline");
+  return refusal(GrabStatus::timeout, title_of(worker_->camera_) + ": no frame by the deadline");
 }
 
 CameraWorker::CameraWorker(CameraOptions camera, Open open, CameraWorkerOptions options)
@@ -83,7 +82,7 @@ CameraWorker::CameraWorker(CameraOptions camera, Open open, CameraWorkerOptions 
       open_(std::move(open)),
       options_(options),
       call_due_(steady_clock::now() + options.overdue),
-      last_problem_("camera " + camera_.name + " (" + camera_.address + "): not opened yet"),
+      last_problem_(title_of(camera_) + ": not opened yet"),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 CameraWorker::~CameraWorker() {
@@ -107,8 +106,8 @@ CameraState CameraWorker::state() const {
 std::string CameraWorker::last_problem() const {
   const std::lock_guard lock(mutex_);
   if (open_now_ && steady_clock::now() > call_due_)
-    return "camera " + camera_.name + " (" + camera_.address +
-           "): does not answer; check its power and cable. It is used again as soon as it answers";
+    return title_of(camera_) +
+           ": does not answer; check its power and cable. It is used again as soon as it answers";
   return last_problem_;
 }
 
@@ -147,13 +146,13 @@ void CameraWorker::run(const std::stop_token& stop) {
       lose(error.what(), status_of(error.fault()));
       in_use = error.fault() == DeviceFault::in_use;
     } catch (const std::exception& error) {
-      lose("camera " + camera_.name + ": " + error.what(), GrabStatus::missing);
+      lose(title_of(camera_) + ": " + error.what(), GrabStatus::missing);
     }
     camera.reset();
     wait_to_retry(stop, in_use ? options_.in_use_retry : retry);
     retry = std::min(2 * retry, options_.longest_retry);
   }
-  lose("camera " + camera_.name + ": stopped", GrabStatus::missing);
+  lose(title_of(camera_) + ": stopped", GrabStatus::missing);
 }
 
 std::unique_ptr<Camera> CameraWorker::open() {
@@ -227,8 +226,7 @@ void CameraWorker::answer(Camera& camera, Request& request) {
       return;
     }
     ++timeouts_;
-    result = refusal(GrabStatus::timeout,
-                     "camera " + camera_.name + " (" + camera_.address + "): no frame by the deadline");
+    result = refusal(GrabStatus::timeout, title_of(camera_) + ": no frame by the deadline");
   } catch (const DeviceError& error) {
     result = refusal(status_of(error.fault()), error.what());
   }

@@ -24,7 +24,7 @@ bool follows(std::uint64_t id, std::uint64_t last) {
 GigeCamera::GigeCamera(CameraOptions options) : options_(std::move(options)), device_(options_) {}
 
 void GigeCamera::fail(const std::string& what, DeviceFault fault) const {
-  throw DeviceError("camera " + device_.where() + ": " + what, fault);
+  throw DeviceError(device_.where() + ": " + what, fault);
 }
 
 void GigeCamera::start() {
@@ -132,8 +132,17 @@ std::optional<Frame> GigeCamera::grab(TimePoint deadline) {
   require_in_sequence(*received);
   require_size(*received);
   ++statistics_.frames;
-  return Frame{options_.name, ++sequence_,       received->device_time_ns, triggered_,
-               now,           options_.width_px, options_.height_px,       std::move(received->pixels)};
+  Frame frame;
+  frame.camera = options_.name;
+  frame.sequence = ++sequence_;
+  frame.device_time_ns = received->device_time_ns;
+  frame.triggered = triggered_;
+  frame.received = now;
+  frame.width_px = options_.width_px;
+  frame.height_px = options_.height_px;
+  frame.stride_bytes = options_.width_px;
+  frame.pixels = own_pixels(std::move(received->pixels));
+  return frame;
 }
 
 void GigeCamera::check() {

@@ -123,7 +123,7 @@ struct GigeDevice::Handles {
 };
 
 void GigeDevice::Handles::fail(const std::string& what, DeviceFault fault) const {
-  throw DeviceError("camera " + options.name + " (" + options.address + "): " + what, fault);
+  throw DeviceError(title_of(options) + ": " + what, fault);
 }
 
 void GigeDevice::Handles::require(const Error& error, std::string_view doing) const {
@@ -134,7 +134,7 @@ void GigeDevice::Handles::require(const Error& error, std::string_view doing) co
 
 void GigeDevice::Handles::open(const NetworkInterface& interface) {
   const Owner<GInetAddress> here(g_inet_address_new_from_string(interface.address.c_str()));
-  const Owner<GInetAddress> there(g_inet_address_new_from_string(options.address.c_str()));
+  const Owner<GInetAddress> there(g_inet_address_new_from_string(options.gige.address.c_str()));
   Error error;
   device.reset(arv_gv_device_new(here.get(), there.get(), error.out()));
   require(error, "opening");
@@ -253,7 +253,7 @@ bool GigeDevice::Handles::lost() const {
 // Saves the seconds that a command to a device costs that is gone.
 void GigeDevice::Handles::notice_silence() noexcept {
   try {
-    if (!lost() && !read_register(options.address, version_register, sign_of_life)) found_lost = true;
+    if (!lost() && !read_register(options.gige.address, version_register, sign_of_life)) found_lost = true;
   } catch (const DeviceError&) {
     found_lost = true;
   }
@@ -271,10 +271,10 @@ void GigeDevice::Handles::wait_until_quiet() {
 }
 
 GigeDevice::GigeDevice(const CameraOptions& options) : handles_(std::make_unique<Handles>(options)) {
-  if (!read_register(options.address, version_register, sign_of_life))
+  if (!read_register(options.gige.address, version_register, sign_of_life))
     handles_->fail("does not answer; check its power, cable and address");
   // Reading this register renews the controller's claim in some devices: not more often than a heartbeat.
-  const auto privilege = read_register(options.address, control_privilege_register, sign_of_life);
+  const auto privilege = read_register(options.gige.address, control_privilege_register, sign_of_life);
   if ((privilege.value_or(0) & control_privilege_bits) != 0) handles_->fail_in_use();
   NetworkInterface interface;
   {
@@ -284,7 +284,7 @@ GigeDevice::GigeDevice(const CameraOptions& options) : handles_(std::make_unique
     const std::lock_guard lock(one_at_a_time);
     // As late as possible: arv_gv_device_finalize dereferences null when arv_gv_device_constructed could not
     // bind to the interface's address, because it went away.
-    interface = interface_towards(options.address);
+    interface = interface_towards(options.gige.address);
     handles_->open(interface);
   }
   handles_->configure();
@@ -352,7 +352,8 @@ std::optional<ReceivedFrame> GigeDevice::receive(TimePoint deadline) {
 }
 
 void GigeDevice::require_control() {
-  const auto privilege = read_register(handles_->options.address, control_privilege_register, sign_of_life);
+  const auto privilege =
+      read_register(handles_->options.gige.address, control_privilege_register, sign_of_life);
   if (privilege && (*privilege & control_privilege_bits) != 0) return;
   handles_->found_lost = true;
   if (!privilege) handles_->fail("does not answer; check its power and cable. It is used again when it does");
@@ -372,8 +373,6 @@ CameraStatistics GigeDevice::statistics() const {
   return handles_->closed_streams + current;
 }
 
-std::string GigeDevice::where() const {
-  return handles_->options.name + " (" + handles_->options.address + ")";
-}
+std::string GigeDevice::where() const { return title_of(handles_->options); }
 
 }  // namespace zeropose

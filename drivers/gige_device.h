@@ -39,7 +39,7 @@ class GigeDevice {
   void require_control();
   bool lost() const;                    // it did not, or the library gave up its heartbeat; does not block
   CameraStatistics statistics() const;  // the library's part
-  std::string where() const;            // name and address, for messages
+  std::string where() const;            // how messages begin
 
  private:
   struct Handles;

@@ -1,3 +1,5 @@
+#include <utility>
+
 #include "drivers/camera.h"
 #include "drivers/gige_camera.h"
 
@@ -16,8 +18,37 @@ CameraStatistics operator+(const CameraStatistics& a, const CameraStatistics& b)
           a.missing_packets + b.missing_packets};
 }
 
+std::shared_ptr<const std::uint8_t> own_pixels(std::vector<std::uint8_t> pixels) {
+  const auto owner = std::make_shared<const std::vector<std::uint8_t>>(std::move(pixels));
+  return {owner, owner->data()};
+}
+
+std::string place_of(const CameraOptions& camera) {
+  switch (camera.driver) {
+    case CameraDriver::gige:
+      if (!camera.gige.address.empty()) return camera.gige.address;
+      return camera.gige.serial.empty() ? camera.gige.user_name : "serial " + camera.gige.serial;
+    case CameraDriver::v4l2:
+      return camera.v4l2.device;
+    case CameraDriver::folder:
+      return camera.folder.path.string();
+  }
+  return {};
+}
+
+std::string title_of(const CameraOptions& camera) {
+  return "camera " + camera.name + " (" + place_of(camera) + ")";
+}
+
 std::unique_ptr<Camera> open_camera(const CameraOptions& options) {
-  return std::make_unique<GigeCamera>(options);
+  switch (options.driver) {
+    case CameraDriver::gige:
+      return std::make_unique<GigeCamera>(options);
+    case CameraDriver::v4l2:
+    case CameraDriver::folder:
+      break;
+  }
+  throw DeviceError(title_of(options) + ": this build has no such driver");
 }
 
 }  // namespace zeropose

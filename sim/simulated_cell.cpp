@@ -11,7 +11,7 @@ namespace {
 std::vector<ServedCamera> served(const std::vector<CameraOptions>& cameras) {
   std::vector<ServedCamera> all;
   for (const CameraOptions& camera : cameras)
-    all.push_back({camera.name, camera.address, camera.width_px, camera.height_px});
+    all.push_back({camera.name, camera.gige.address, camera.width_px, camera.height_px});
   return all;
 }
 

@@ -19,7 +19,7 @@ TEST(Cell, LoadsTheExample) {
   EXPECT_EQ(cell.name, "car-body");
   EXPECT_TRUE(cell.simulated);
   ASSERT_EQ(cell.cameras.size(), 4U);
-  EXPECT_EQ(cell.cameras[2].address, "127.0.0.13");
+  EXPECT_EQ(cell.cameras[2].gige.address, "127.0.0.13");
   EXPECT_EQ(cell.cameras[2].width_px, 768);
   EXPECT_FALSE(cell.cameras[2].exposure_us);
   ASSERT_EQ(cell.calibration.size(), 4U);
@@ -240,7 +240,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"/jobs/0/limits", "[]", "jobs[0].limits: found an array of 0, expected an object"},
         Mistake{"/robots/0/link/type", "\"can\"",
                 "robots[0].link.type: found \"can\", expected one of modbus-tcp"},
-        Mistake{"/cameras/0/driver", "\"v4l2\"", "cameras[0].driver: found \"v4l2\", expected one of gige"},
+        Mistake{"/cameras/0/driver", "\"usb\"",
+                "cameras[0].driver: found \"usb\", expected one of gige, v4l2, folder"},
         Mistake{"/timing/deadline_ms", "49",
                 "timing.deadline_ms: found 49, expected an integer from 50 to 60000"}));
 
@@ -399,7 +400,7 @@ TEST(Cell, AllMistakesAtOnce) {
   EXPECT_THAT(
       mistakes_in(json.dump(), calibration.dump()),
       UnorderedElementsAre(HasSubstr("cell.json: name: found 1"),
-                           HasSubstr("cell.json: cameras[0].address: found no such key, expected"),
+                           HasSubstr("cell.json: cameras[0].address: found nothing, expected"),
                            HasSubstr("cell.json: jobs[0].marks[11].radius_mm: found \"wide\""),
                            HasSubstr("cell.json: jobs[0].limits.rz_deg: found an array of 1"),
                            HasSubstr("cell.json: robots[0].colour: found an unknown key"),
@@ -467,6 +468,69 @@ TEST(Cell, FilesThatCannotBeRead) {
               HasSubstr("empty.json:1:1: found a syntax error"));
   EXPECT_THAT(load_error(directory.write("huge.json", example_text() + std::string(max_file_bytes, ' '))),
               HasSubstr("huge.json: found more than 16 MB"));
+}
+
+TEST(CellCameras, AllDriversWithAllTheirKeys) {
+  Json json = example();
+  json["cameras"][0].update(parsed(R"({"x_px": 8, "y_px": 4, "pixel_format": "mono12_packed",
+    "trigger": "free_run", "frame_rate_hz": 25, "black_level": 4, "gamma": 1, "serial": "4711", "user_name": "left",
+    "trigger_line": "Line2", "network": {"interface": "eth1", "packet_bytes": 8228, "packet_socket": "always",
+    "resend": false, "ptp": true}})"));
+  json["cameras"][1] = parsed(R"({"name": "camera2", "driver": "v4l2", "width_px": 768, "height_px": 572,
+    "device": "/dev/video0", "input": 1, "fields": "bottom", "controls": [{"name": "Gain", "value": -3}]})");
+  json["cameras"][2] = parsed(R"({"name": "camera3", "driver": "folder", "width_px": 768, "height_px": 572,
+    "path": "pictures", "loop": false})");
+  const Cell cell = parse_cell({json.dump(), "", example_calibration_text(), ""});
+  const CameraOptions& gige = cell.cameras[0];
+  EXPECT_EQ(gige.x_px, 8);
+  EXPECT_EQ(gige.y_px, 4);
+  EXPECT_EQ(gige.format, PixelFormat::mono12_packed);
+  EXPECT_EQ(gige.trigger, TriggerSource::free_run);
+  EXPECT_EQ(gige.frame_rate_hz, 25);
+  EXPECT_EQ(gige.black_level, 4);
+  EXPECT_EQ(gige.gamma, 1);
+  EXPECT_EQ(gige.gige.serial, "4711");
+  EXPECT_EQ(gige.gige.user_name, "left");
+  EXPECT_EQ(gige.gige.trigger_line, "Line2");
+  EXPECT_EQ(gige.gige.interface, "eth1");
+  EXPECT_EQ(gige.gige.packet_bytes, 8228);
+  EXPECT_EQ(gige.gige.packet_socket, PacketSocket::always);
+  EXPECT_FALSE(gige.gige.resend);
+  EXPECT_TRUE(gige.gige.ptp);
+  const CameraOptions& v4l2 = cell.cameras[1];
+  EXPECT_EQ(v4l2.driver, CameraDriver::v4l2);
+  EXPECT_EQ(v4l2.v4l2.device, "/dev/video0");
+  EXPECT_EQ(v4l2.v4l2.input, 1);
+  EXPECT_EQ(v4l2.v4l2.fields, Fields::bottom);
+  ASSERT_EQ(v4l2.v4l2.controls.size(), 1U);
+  EXPECT_EQ(v4l2.v4l2.controls[0].name, "Gain");
+  EXPECT_EQ(v4l2.v4l2.controls[0].value, -3);
+  EXPECT_EQ(cell.cameras[2].folder.path, "pictures");
+  EXPECT_FALSE(cell.cameras[2].folder.loop);
+}
+
+TEST(CellCameras, KeysOfAnotherDriverAreRefused) {
+  Json json = example();
+  json["cameras"][0]["device"] = "/dev/video0";
+  json["cameras"][1]["driver"] = "folder";
+  EXPECT_THAT(
+      mistakes_in(json),
+      ElementsAre(
+          "cell.json: cameras[0].device: found a key of driver v4l2, expected no such key with driver gige",
+          "cell.json: cameras[1].address: found a key of driver gige, expected no such key with driver "
+          "folder",
+          "cell.json: cameras[1].path: found nothing, expected a folder of pictures, relative to this "
+          "file"));
+}
+
+TEST(CellCameras, SomethingMustSayWhichCameraItIs) {
+  Json json = example();
+  json["cameras"][0].erase("address");
+  EXPECT_THAT(mistakes_in(json), ElementsAre(HasSubstr("cameras[0].address: found nothing")));
+  json["cameras"][0]["serial"] = "4711";
+  EXPECT_THAT(mistakes_in(json), IsEmpty());
+  json["cameras"][1]["serial"] = "4711";
+  EXPECT_THAT(mistakes_in(json), ElementsAre(HasSubstr("cameras[1].serial: found 4711, as in cameras[0]")));
 }
 
 }  // namespace

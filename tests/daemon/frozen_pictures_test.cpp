@@ -14,10 +14,12 @@ class Frozen : public testing::Test {
     Frame frame;
     frame.width_px = 64;
     frame.height_px = 48;
-    frame.pixels.resize(64 * 48);
+    frame.stride_bytes = 64;
+    std::vector<std::uint8_t> pixels(64 * 48);
     std::uniform_int_distribution<int> noise(-noise_grey, noise_grey);
-    for (auto& pixel : frame.pixels)
+    for (auto& pixel : pixels)
       pixel = static_cast<std::uint8_t>(std::clamp(middle_grey + noise(random), 0, 255));
+    frame.pixels = own_pixels(std::move(pixels));
     return frame;
   }
 
@@ -42,7 +44,9 @@ TEST_F(Frozen, TheSamePictureAgainIsFoundForTheCameraThatSentIt) {
 TEST_F(Frozen, OneGreyLevelOfOnePixelTellsThemApart) {
   Frame live = frame(100, 2);
   pictures.repeats(0, live);
-  live.pixels[32 * 64 + 17] ^= 1;
+  std::vector<std::uint8_t> pixels(live.pixels.get(), live.pixels.get() + 64 * 48);
+  pixels[32 * 64 + 17] ^= 1;
+  live.pixels = own_pixels(std::move(pixels));
   EXPECT_FALSE(pictures.repeats(0, live));
 }
 

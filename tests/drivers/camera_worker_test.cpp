@@ -202,7 +202,7 @@ class ScriptedWorker : public ::testing::Test {
   void SetUp() override { ASSERT_TRUE(becomes_state(worker_, CameraState::alive, 5s)); }
 
   Script script_;
-  CameraWorker worker_{CameraOptions{.name = "camera1", .address = "test"},
+  CameraWorker worker_{CameraOptions{.name = "camera1", .gige = {.address = "test"}},
                        [this](const CameraOptions&) { return std::make_unique<ScriptedCamera>(script_); },
                        CameraWorkerOptions{.check_period = 50ms, .overdue = 400ms}};
 };

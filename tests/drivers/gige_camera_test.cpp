@@ -195,7 +195,7 @@ TEST(OpenCamera, NothingThere) {
 }
 
 TEST(OpenCamera, NotAnAddress) {
-  CameraOptions options{.name = "camera1", .address = "127.0.0", .width_px = 768, .height_px = 572};
+  CameraOptions options{.name = "camera1", .width_px = 768, .height_px = 572, .gige = {.address = "127.0.0"}};
   EXPECT_THAT(failure([&] { const GigeCamera camera(options); }).second, HasSubstr("not an IPv4 address"));
 }
 

@@ -23,7 +23,7 @@ struct PictureNumber {
 
 inline PictureNumber number_of(const Frame& frame) {
   PictureNumber number;
-  std::memcpy(&number, frame.pixels.data(), sizeof number);
+  std::memcpy(&number, frame.pixels.get(), sizeof number);
   return number;
 }
 
@@ -35,8 +35,9 @@ inline std::uint8_t pixel_of(std::uint64_t scene, std::size_t place) {
 // Every pixel behind the number must be that of the scene and in its place.
 inline bool all_of_one_scene(const Frame& frame) {
   const std::uint64_t scene = number_of(frame).scene;
-  for (std::size_t i = sizeof(PictureNumber); i < frame.pixels.size(); ++i)
-    if (frame.pixels[i] != pixel_of(scene, i)) return false;
+  const auto width = static_cast<std::size_t>(frame.width_px);
+  for (std::size_t i = sizeof(PictureNumber); i < width * static_cast<std::size_t>(frame.height_px); ++i)
+    if (frame.row(static_cast<int>(i / width))[i % width] != pixel_of(scene, i)) return false;
   return true;
 }
 
@@ -62,7 +63,7 @@ class NumberedCameras {
     for (std::size_t i = 0; i < count; ++i) {
       CameraOptions options;
       options.name = "camera" + std::to_string(i + 1);
-      options.address = "127.0.0." + std::to_string(11 + i);
+      options.gige.address = "127.0.0." + std::to_string(11 + i);
       options.width_px = width_px;
       options.height_px = height_px;
       all.push_back(std::move(options));
@@ -74,7 +75,7 @@ class NumberedCameras {
   static std::vector<ServedCamera> served(const std::vector<CameraOptions>& all) {
     std::vector<ServedCamera> cameras;
     for (const CameraOptions& options : all)
-      cameras.push_back({options.name, options.address, options.width_px, options.height_px});
+      cameras.push_back({options.name, options.gige.address, options.width_px, options.height_px});
     return cameras;
   }
 
