@@ -21,10 +21,20 @@ if(ZEROPOSE_SANITIZE)
   endif()
 endif()
 
+# ThreadSanitizer leaves the pure rooms as they are: then they need not be compiled again.
+set(ZEROPOSE_PURE_ROOMS_OF "" CACHE PATH "A finished build whose libraries of the pure rooms are used (preset tsan only)")
+
 # zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME. PRECOMPILED: the group of headers it begins with,
 # pure for a room without threads and I/O.
 function(zeropose_room name)
   cmake_parse_arguments(ROOM "" "PRECOMPILED" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
+  if(ZEROPOSE_PURE_ROOMS_OF AND ROOM_PRECOMPILED STREQUAL pure)
+    add_library(zeropose_${name} STATIC IMPORTED GLOBAL)
+    set_target_properties(zeropose_${name} PROPERTIES
+      IMPORTED_LOCATION ${ZEROPOSE_PURE_ROOMS_OF}/${name}/libzeropose_${name}.a)
+    target_link_libraries(zeropose_${name} INTERFACE zeropose_flags ${ROOM_LINK} ${ROOM_PRIVATE_LINK})
+    return()
+  endif()
   add_library(zeropose_${name} STATIC ${ROOM_SOURCES})
   target_link_libraries(zeropose_${name} PUBLIC zeropose_flags ${ROOM_LINK} PRIVATE ${ROOM_PRIVATE_LINK})
   if(ROOM_PRECOMPILED)

@@ -283,14 +283,14 @@ TEST(Daemon, WrongConfigEndsWithStatus2) {
   const TemporaryFolder folder;
   std::ofstream(folder / "cell.json") << "{ \"name\": 5 }";
   const Finished finished =
-      run_program({std::string(ZEROPOSE_BIN_DIR) + "/zeroposed", "--cell", (folder / "cell.json").string()});
+      run_program({program_path("zeroposed"), "--cell", (folder / "cell.json").string()});
   EXPECT_EQ(finished.status, 2);
   EXPECT_THAT(finished.err, HasSubstr("name"));
 }
 
 TEST(Daemon, StatusWithoutADaemonSaysSo) {
   const Finished finished = run_program(
-      {std::string(ZEROPOSE_BIN_DIR) + "/zeropose", "status", "--socket", "/tmp/no-such-folder/x.sock"});
+      {program_path("zeropose"), "status", "--socket", "/tmp/no-such-folder/x.sock"});
   EXPECT_EQ(finished.status, 2);
   EXPECT_THAT(finished.err, HasSubstr("is the program running?"));
 }

@@ -17,14 +17,6 @@ using Json = nlohmann::json;
 
 constexpr auto start_patience = 60s;  // sanitizers are slow
 
-std::string program(const std::string& name) { return std::string(ZEROPOSE_BIN_DIR) + "/" + name; }
-
-// A daemon that is slow under a sanitizer needs a cell that keeps its times: ZEROPOSE_CELL may name one.
-std::string cell_program() {
-  const char* given = std::getenv("ZEROPOSE_CELL");
-  return given != nullptr ? given : program("zeropose-cell");
-}
-
 SimulatedRobotOptions robot_options() {
   SimulatedRobotOptions options;
   options.convention = Convention::kuka;
@@ -44,6 +36,11 @@ Pose robot_in_world() { return from_six_numbers({1200, -2400, -150, 0, 0, 90}); 
 
 }  // namespace
 
+std::string program_path(const std::string& name) {
+  const char* tools = name == "zeroposed" ? nullptr : std::getenv("ZEROPOSE_TOOLS");
+  return (tools != nullptr ? tools : std::string(ZEROPOSE_BIN_DIR)) + "/" + name;
+}
+
 TemporaryFolder::TemporaryFolder() {
   std::string name = (std::filesystem::temp_directory_path() / "zeropose-test-XXXXXX").string();
   if (!::mkdtemp(name.data())) throw std::runtime_error("cannot make " + name);
@@ -59,10 +56,10 @@ WalkingLine::WalkingLine(std::filesystem::path cell)
       recorder_(recorder_options()) {}
 
 void WalkingLine::start_cell() {
-  cell_process =
-      std::make_unique<Process>(std::vector<std::string>{cell_program(), "--cell", cell_.string(),
-                                                         "--control", (folder_ / "cell.sock").string()},
-                                folder_ / "cell.log");
+  cell_process = std::make_unique<Process>(
+      std::vector<std::string>{program_path("zeropose-cell"), "--cell", cell_.string(), "--control",
+                               (folder_ / "cell.sock").string()},
+      folder_ / "cell.log");
   const auto deadline = std::chrono::steady_clock::now() + start_patience;
   while (!std::filesystem::exists(folder_ / "cell.sock") && std::chrono::steady_clock::now() < deadline)
     std::this_thread::sleep_for(20ms);
@@ -71,8 +68,8 @@ void WalkingLine::start_cell() {
 
 void WalkingLine::start_daemon() {
   daemon_process = std::make_unique<Process>(
-      std::vector<std::string>{program("zeroposed"), "--cell", cell_.string(), "--state", state().string(),
-                               "--socket", (folder_ / "zeropose.sock").string()},
+      std::vector<std::string>{program_path("zeroposed"), "--cell", cell_.string(), "--state",
+                               state().string(), "--socket", (folder_ / "zeropose.sock").string()},
       folder_ / "daemon.log",
       std::vector<std::string>{"NOTIFY_SOCKET=" + (folder_ / "notify.sock").string(),
                                "WATCHDOG_USEC=2000000"});
@@ -137,7 +134,7 @@ Json WalkingLine::fault(const std::string& kind, const Json& more) {
 }
 
 Finished WalkingLine::zeropose(std::vector<std::string> arguments) const {
-  arguments.insert(arguments.begin(), program("zeropose"));
+  arguments.insert(arguments.begin(), program_path("zeropose"));
   arguments.insert(arguments.end(), {"--socket", (folder_ / "zeropose.sock").string()});
   return run_program(arguments);
 }

@@ -16,6 +16,10 @@ namespace zeropose {
 // Of each car with the wrong calibration of seed 1.
 inline constexpr double line_error_mm = 0.4, line_error_deg = 0.012;
 
+// The daemon is the one under test. ZEROPOSE_TOOLS may name a folder with the other programs: a daemon that
+// is slow under a sanitizer needs a cell that keeps its times.
+std::string program_path(const std::string& name);
+
 // A folder that goes with its owner.
 class TemporaryFolder {
  public:
@@ -30,7 +34,7 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-// Files live in `folder`: state/, control and notify sockets, logs. Programs come from ZEROPOSE_BIN_DIR.
+// Files live in `folder`: state/, control and notify sockets, logs.
 class WalkingLine {
  public:
   explicit WalkingLine(std::filesystem::path cell = std::filesystem::path(ZEROPOSE_SOURCE_DIR) /
