@@ -7,7 +7,6 @@
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -17,26 +16,13 @@
 #include <memory>
 
 #include "drivers/camera.h"
+#include "drivers/udp_socket.h"
 
 namespace zeropose {
 namespace {
 
 constexpr std::uint16_t control_port = 3956;  // GigE Vision 2.0, GVCP
 constexpr int jumbo_bytes = 9000;
-
-class UdpSocket {
- public:
-  UdpSocket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    if (fd_ < 0) throw DeviceError(std::string("no UDP socket: ") + std::strerror(errno));
-  }
-  ~UdpSocket() { ::close(fd_); }
-  UdpSocket(const UdpSocket&) = delete;
-  UdpSocket& operator=(const UdpSocket&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 in_addr parse(const std::string& address) {
   in_addr parsed{};
