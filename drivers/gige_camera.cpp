@@ -18,7 +18,7 @@ constexpr std::chrono::milliseconds repeated_command{400};
 
 constexpr std::chrono::seconds health_period{10};
 
-constexpr int trials = 4;
+constexpr int trials = 8;  // more than there are buffers: all may be full of frames that nobody asked for
 constexpr std::chrono::milliseconds trial_time{1000};
 
 bool follows(std::uint64_t id, std::uint64_t last) {

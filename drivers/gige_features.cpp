@@ -207,7 +207,7 @@ void GigeFeatures::set_free_run() const {
 void GigeFeatures::set_ptp() const {
   if (!options_.gige.ptp) return;
   const bool old_name = !has("PtpEnable") && has("GevIEEE1588");
-  if (!old_name) need("PtpEnable", "ptp");
+  if (!old_name) need("PtpEnable", "network.ptp");
   set_switch(old_name ? "GevIEEE1588" : "PtpEnable", true);
 }
 
