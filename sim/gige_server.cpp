@@ -141,7 +141,7 @@ void GigeServer::Slot::start() {
     auto* data = static_cast<std::uint8_t*>(const_cast<void*>(arv_buffer_get_data(buffer, &unknown)));
     const auto bytes = static_cast<std::size_t>(arv_buffer_get_image_width(buffer)) *
                        static_cast<std::size_t>(arv_buffer_get_image_height(buffer));
-    if (format == ARV_PIXEL_FORMAT_MONO_8) return slot->server->expose(*slot, {data, bytes});
+    if (ARV_PIXEL_FORMAT_BIT_PER_PIXEL(format) == 8) return slot->server->expose(*slot, {data, bytes});
     std::vector<std::uint8_t> grey(bytes);
     slot->server->expose(*slot, grey);
     write_deep(grey, format, data);

@@ -17,10 +17,11 @@ namespace zeropose {
 
 // Where its features lie.
 namespace rich {
-inline constexpr std::uint32_t offset_x = 0x130, offset_y = 0x134, exposure_us = 0x120, gain = 0x110,
-                               frame_period_us = 0x138, trigger_mode = 0x300, trigger_source = 0x304,
-                               trigger_software = 0x30c, black_level = 0x2000, gamma_enable = 0x2004,
-                               gamma = 0x2008, ptp_enable = 0x200c, ptp_status = 0x2010, temperature = 0x2014,
+inline constexpr std::uint32_t width = 0x100, height = 0x104, pixel_format = 0x128, offset_x = 0x130,
+                               offset_y = 0x134, exposure_us = 0x120, gain = 0x110, frame_period_us = 0x138,
+                               trigger_mode = 0x300, trigger_source = 0x304, trigger_software = 0x30c,
+                               black_level = 0x2000, gamma_enable = 0x2004, gamma = 0x2008,
+                               ptp_enable = 0x200c, ptp_status = 0x2010, temperature = 0x2014,
                                exposure_auto = 0x2018, chunk_mode = 0x201c, chunk_selector = 0x2020,
                                chunk_enable = 0x2024, gain_auto = 0x2028, trigger_selector = 0x202c,
                                width_of_sensor = 0x11c, height_of_sensor = 0x118;
@@ -81,11 +82,11 @@ class RichDescription {
   void picture() {
     over_register("Integer", "SensorWidth", rich::width_of_sensor);
     over_register("Integer", "SensorHeight", rich::height_of_sensor);
-    over_register("Integer", "Width", 0x100);
-    over_register("Integer", "Height", 0x104);
+    over_register("Integer", "Width", rich::width);
+    over_register("Integer", "Height", rich::height);
     over_register("Integer", "OffsetX", rich::offset_x);
     over_register("Integer", "OffsetY", rich::offset_y);
-    choice("PixelFormat", 0x128,
+    choice("PixelFormat", rich::pixel_format,
            {{"Mono8", 0x01080001},
             {"Mono10", 0x01100003},
             {"Mono12", 0x01100005},
@@ -103,8 +104,8 @@ class RichDescription {
     command("AcquisitionStop", 0x124, 0);
     feature("Float", "AcquisitionFrameRate", "<pValue>FrameRateOfPeriod</pValue>");
     features_ << "<Converter Name=\"FrameRateOfPeriod\"><FormulaTo>1000000 / FROM</FormulaTo>"
-                 "<FormulaFrom>1000000 / TO</FormulaFrom><pValue>FramePeriodReg</pValue></Converter>\n";
-    reg("IntReg", "FramePeriodReg", rich::frame_period_us, "<Sign>Unsigned</Sign>");
+                 "<FormulaFrom>1000000 / TO</FormulaFrom><pValue>FramePeriod</pValue></Converter>\n";
+    over_register("Integer", "FramePeriod", rich::frame_period_us, "<Min>1000</Min><Max>1000000</Max>");
     choice("TriggerSelector", rich::trigger_selector, {{"FrameStart", 1}});
     choice("TriggerMode", rich::trigger_mode, {{"Off", 0}, {"On", 1}});
     choice("TriggerSource", rich::trigger_source,
