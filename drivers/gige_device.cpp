@@ -14,6 +14,7 @@
 #include "drivers/gige_discovery.h"
 #include "drivers/gige_features.h"
 #include "drivers/gige_network.h"
+#include "drivers/gige_packets.h"
 #include "drivers/gige_pixels.h"
 
 namespace zeropose {
@@ -25,8 +26,6 @@ using std::chrono::steady_clock;
 // A camera that is triggered sends one frame at a time; of one that runs freely only the latest are of use.
 constexpr GigeBufferRules triggered_buffers{};
 constexpr GigeBufferRules running_buffers{.count = 8, .kept = 4, .queued = 2};
-constexpr int socket_buffer_bytes = 4 << 20;
-constexpr int untested_packet_bytes = 1500;
 constexpr milliseconds quiet_step{10};
 constexpr int quiet_steps_at_most = 30;
 // GigE Vision 2.0, bootstrap registers: the version; who controls the device, neither bit set: nobody.
@@ -92,10 +91,6 @@ struct GigeDevice::Handles {
   void require_same_camera();
   std::string name_at(std::uint32_t address) const;
   void require_named(std::string_view what, const std::string& wanted, const std::string& got) const;
-  void choose_socket();
-  void set_packet_size(const NetworkInterface& interface);
-  int wanted_packet_bytes(const NetworkInterface& interface);
-  int tested_packet_bytes(const NetworkInterface& interface);
   ReceivedFrame frame_of(GigeBuffers::Full full);
   std::optional<double> chunk_exposure_us(ArvBuffer* buffer) const;
   bool lost() const;
@@ -177,58 +172,6 @@ void GigeDevice::Handles::require_same_camera() {
     require_named("serial number", options.gige.serial, name_at(serial_register));
   if (!options.gige.user_name.empty())
     require_named("user name", options.gige.user_name, name_at(user_name_register));
-}
-
-// Between hosts only a test shows what the switches let through.
-int GigeDevice::Handles::tested_packet_bytes(const NetworkInterface& interface) {
-  const int largest = largest_packet_bytes(interface);
-  if (interface.loopback) return largest;
-  const int safe = std::min(largest, untested_packet_bytes);
-  GigeError error;
-  arv_gv_device_set_packet_size(ARV_GV_DEVICE(device.get()), safe, error.out());
-  require(error, "setting the packet size");
-  const auto tested =
-      static_cast<int>(arv_gv_device_auto_packet_size(ARV_GV_DEVICE(device.get()), error.out()));
-  return error ? safe : std::min(tested, largest);
-}
-
-int GigeDevice::Handles::wanted_packet_bytes(const NetworkInterface& interface) {
-  const int wanted = options.gige.packet_bytes;
-  if (wanted == 0) return tested_packet_bytes(interface);
-  if (wanted > interface.mtu_bytes)
-    fail("network.packet_bytes " + std::to_string(wanted) + " is above what interface " + interface.name +
-         " takes (MTU " + std::to_string(interface.mtu_bytes) +
-         "); lower it in the cell file or raise the MTU");
-  return wanted;
-}
-
-// Left to itself the library prefers a packet socket where it is allowed. That hands over its packets up to
-// 5 ms late, and wrong pixels as a whole frame when a packet is above the MTU. So it is only for where a
-// plain UDP socket would lose packets for want of a buffer.
-void GigeDevice::Handles::choose_socket() {
-  bool plain = options.gige.packet_socket == PacketSocket::never;
-  if (options.gige.packet_socket == PacketSocket::automatic)
-    plain = receive_buffer_allowed(socket_buffer_bytes);
-  else if (!plain && !packet_socket_allowed())
-    fail(
-        "network.packet_socket \"always\" needs the right CAP_NET_RAW; give it to the program or choose "
-        "\"automatic\" in the cell file");
-  arv_gv_device_set_stream_options(
-      ARV_GV_DEVICE(device.get()),
-      plain ? ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED : ARV_GV_STREAM_OPTION_NONE);
-}
-
-void GigeDevice::Handles::set_packet_size(const NetworkInterface& interface) {
-  ArvGvDevice* gv_device = ARV_GV_DEVICE(device.get());
-  arv_gv_device_set_packet_size_adjustment(gv_device, ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER);
-  GigeError error;
-  arv_gv_device_set_packet_size(gv_device, wanted_packet_bytes(interface), error.out());
-  require(error, "setting the packet size");
-  const auto got = static_cast<int>(arv_gv_device_get_packet_size(gv_device, error.out()));
-  require(error, "reading the packet size back");
-  if (got > interface.mtu_bytes)
-    fail("insists on packets of " + std::to_string(got) + " bytes, interface " + interface.name + " takes " +
-         std::to_string(interface.mtu_bytes) + "; raise its MTU");
 }
 
 std::optional<double> GigeDevice::Handles::chunk_exposure_us(ArvBuffer* buffer) const {
@@ -332,8 +275,7 @@ GigeDevice::GigeDevice(const CameraOptions& options) : handles_(std::make_unique
   }
   own.require_same_camera();
   own.features().configure();
-  own.choose_socket();
-  own.set_packet_size(interface);
+  GigePackets(own.device.get(), own.options).configure(interface);
   if (!own.features().chunks()) return;
   const std::lock_guard lock(reads_description);
   own.chunks.reset(arv_camera_create_chunk_parser(own.camera.get()));
@@ -350,7 +292,7 @@ void GigeDevice::open_stream() {
   own.require(error, "creating the stream");
   g_object_set(
       stream.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-      socket_buffer_bytes, "packet-resend",
+      GigePackets::socket_buffer_bytes, "packet-resend",
       own.options.gige.resend ? ARV_GV_STREAM_PACKET_RESEND_ALWAYS : ARV_GV_STREAM_PACKET_RESEND_NEVER,
       nullptr);
   const unsigned payload_bytes = arv_camera_get_payload(own.camera.get(), error.out());

@@ -28,8 +28,8 @@ struct ServedCamera {
 class GigeServer {
  public:
   // Fills width * height grey levels of 0..255, whatever the pixel format: that has white at its own highest
-  // value, and the same share of white. Called from one thread only, anew for every
-  // frame.
+  // value, and the same share of white. Called from one thread only, anew for
+  // every frame.
   using Draw = std::function<void(std::size_t camera, std::span<std::uint8_t> pixels)>;
 
   // Throws std::runtime_error: an address is on no interface (says how to add it) or already served.
