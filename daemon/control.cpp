@@ -24,6 +24,10 @@ double milliseconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
+double microseconds(std::chrono::nanoseconds time) {
+  return std::chrono::duration<double, std::micro>(time).count();
+}
+
 Json verdict(Code code, const std::string& reason) {
   return {{"status", code == Code::ok ? "ok" : "not ok"},
           {"code", static_cast<int>(code)},
@@ -48,17 +52,26 @@ Json check_json(const CameraCheck& check) {
           {"farthest_px", check.farthest_px}};
 }
 
+Json camera_json(const CameraStatus& camera) {
+  const CameraStatistics& counted = camera.statistics;
+  Json json{{"name", camera.name},
+            {"alive", camera.state == CameraState::alive},
+            {"last_problem", camera.last_problem},
+            {"references", check_json(camera.check)},
+            {"frames", counted.frames},
+            {"timeouts", counted.timeouts},
+            {"damaged", counted.damaged},
+            {"resent_packets", counted.resent_packets},
+            {"underruns", counted.underruns}};
+  if (counted.temperature_c) json["temperature_c"] = *counted.temperature_c;
+  if (!counted.ptp_state.empty()) json["ptp_state"] = counted.ptp_state;
+  return json;
+}
+
 Json status_answer(Cycle& cycle) {
   const Status status = cycle.status();
   Json cameras = Json::array();
-  for (const auto& camera : status.cameras)
-    cameras.push_back({{"name", camera.name},
-                       {"alive", camera.state == CameraState::alive},
-                       {"last_problem", camera.last_problem},
-                       {"references", check_json(camera.check)},
-                       {"frames", camera.statistics.frames},
-                       {"timeouts", camera.statistics.timeouts},
-                       {"damaged", camera.statistics.damaged}});
+  for (const auto& camera : status.cameras) cameras.push_back(camera_json(camera));
   Json answer{{"status", "ok"},
               {"cell", cycle.cell().name},
               {"simulated", cycle.cell().simulated},
@@ -125,6 +138,8 @@ Json measure_answer(Cycle& cycle) {
   Json answer = verdict(m.code, m.reason);
   answer["grab_ms"] = milliseconds(outcome.grab);
   answer["compute_ms"] = milliseconds(outcome.compute);
+  if (!outcome.frames.empty()) answer["trigger_spread_us"] = microseconds(outcome.trigger_spread);
+  if (outcome.device_spread) answer["device_spread_us"] = microseconds(*outcome.device_spread);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
   answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
   if (m.code != Code::ok) return answer;

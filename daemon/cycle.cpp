@@ -299,6 +299,8 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
     return outcome;
   }
   outcome.frames = std::move(grabbed.frames);
+  outcome.trigger_spread = grabbed.trigger_spread;
+  outcome.device_spread = grabbed.device_spread;
   on_exposed();
   const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
   m = zeropose::measure({images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero, X_O0O_last_,

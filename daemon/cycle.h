@@ -26,6 +26,8 @@ struct MeasureOutcome {
   Measurement measurement;
   std::vector<Frame> frames;  // in the order of the job's cameras; empty when the grab failed
   std::chrono::nanoseconds grab{}, compute{};
+  std::chrono::nanoseconds trigger_spread{};              // of the frames, as in FrameSet
+  std::optional<std::chrono::nanoseconds> device_spread;  // likewise
 };
 
 struct ZeroOutcome {

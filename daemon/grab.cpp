@@ -1,5 +1,7 @@
 #include "daemon/grab.h"
 
+#include <algorithm>
+
 namespace zeropose {
 
 Code code_of(GrabStatus status) {
@@ -16,6 +18,18 @@ Code code_of(GrabStatus status) {
       return Code::frame_wrong_size;
   }
   return Code::internal;
+}
+
+std::chrono::nanoseconds trigger_spread(std::span<const Frame> frames) {
+  if (frames.empty()) return {};
+  const auto [first, last] = std::ranges::minmax(frames, {}, &Frame::triggered);
+  return last.triggered - first.triggered;
+}
+
+std::optional<std::chrono::nanoseconds> device_spread(std::span<const Frame> frames) {
+  if (frames.empty() || !std::ranges::all_of(frames, &Frame::network_time)) return std::nullopt;
+  const auto [first, last] = std::ranges::minmax(frames, {}, &Frame::device_time_ns);
+  return std::chrono::nanoseconds(last.device_time_ns - first.device_time_ns);
 }
 
 Grabber::Grabber(const std::vector<CameraOptions>& cameras) : pictures_(cameras.size()) {
@@ -50,6 +64,8 @@ FrameSet Grabber::grab_live(std::span<const std::size_t> cameras, TimePoint dead
       if (pictures_.repeats(cameras[i], set.frames[i]))
         fail(Code::frame_frozen, set.frames[i].camera + " delivered the same picture as before, bit for bit");
   if (set.code != Code::ok) set.frames.clear();
+  set.trigger_spread = trigger_spread(set.frames);
+  set.device_spread = device_spread(set.frames);
   return set;
 }
 

@@ -1,7 +1,9 @@
 // One frame of each camera wanted, exposed after now, by the deadline.
 #pragma once
 
+#include <chrono>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -19,7 +21,14 @@ struct FrameSet {
   Code code = Code::internal;  // of the first camera that failed
   std::string reason;          // of all that did
   std::vector<Frame> frames;
+  std::chrono::nanoseconds trigger_spread{};  // from the earliest to the latest trigger, by this computer
+  // From the earliest to the latest frame, by the cameras' clocks; when all of them follow the network's.
+  std::optional<std::chrono::nanoseconds> device_spread;
 };
+
+// Of frames that were asked for together.
+std::chrono::nanoseconds trigger_spread(std::span<const Frame> frames);
+std::optional<std::chrono::nanoseconds> device_spread(std::span<const Frame> frames);
 
 class Grabber {
  public:

@@ -22,6 +22,7 @@ struct Frame {
   std::string camera;
   std::uint64_t sequence = 0;        // counted by the driver from 1 for each opening of the device
   std::uint64_t device_time_ns = 0;  // the camera's clock; for logs and spread only
+  bool network_time = false;         // that clock follows the network's (PTP), as those of others may
   TimePoint triggered;               // host, monotonic: when the trigger was sent
   TimePoint received;                // host, monotonic: when the last byte was there
   int width_px = 0, height_px = 0;
@@ -54,17 +55,21 @@ class DeviceError : public std::runtime_error {
 
 // Counted since the device was opened. Every frame that is not handed out is counted somewhere.
 struct CameraStatistics {
-  std::uint64_t frames = 0;           // handed out
-  std::uint64_t timeouts = 0;         // deadlines without a frame
-  std::uint64_t damaged = 0;          // frames that came incomplete or out of sequence
-  std::uint64_t wrong_size = 0;       // frames of another size or pixel format
-  std::uint64_t stale = 0;            // frames that answered no trigger, or one too old
-  std::uint64_t renewals = 0;         // streams thrown away because a frame could have been stale
-  std::uint64_t failures = 0;         // by the library: frames not completed
-  std::uint64_t underruns = 0;        // by the library: no buffer was free
-  std::uint64_t resent_packets = 0;   // by the library
-  std::uint64_t missing_packets = 0;  // by the library
+  std::uint64_t frames = 0;      // handed out
+  std::uint64_t timeouts = 0;    // deadlines without a frame
+  std::uint64_t damaged = 0;     // frames that came incomplete or out of sequence
+  std::uint64_t wrong_size = 0;  // frames of another size or pixel format
+  std::uint64_t stale = 0;       // frames that answered no trigger, or one too old
+  std::uint64_t skipped = 0;     // of a camera that is not triggered by us: perhaps begun before the request
+  std::uint64_t renewals = 0;    // streams thrown away because a frame could have been stale
+  std::uint64_t failures = 0;    // by the library: frames not completed
+  std::uint64_t underruns = 0;   // by the library: no buffer was free
+  std::uint64_t resent_packets = 0;          // by the library
+  std::uint64_t missing_packets = 0;         // by the library
+  std::optional<double> temperature_c = {};  // of the camera, where it says it
+  std::string ptp_state = {};                // "Slave", "Master", ...; empty: no such clock, or not asked for
 };
+// The sum; of what is no count, the newer one, b's.
 CameraStatistics operator+(const CameraStatistics& a, const CameraStatistics& b);
 
 // One thread per camera: no call may be made from two threads, and each may block while a device is being

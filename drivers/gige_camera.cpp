@@ -1,8 +1,12 @@
 #include "drivers/gige_camera.h"
 
 #include <chrono>
+#include <cmath>
+#include <cstdio>
 #include <stdexcept>
 #include <utility>
+
+#include "drivers/gige_pixels.h"
 
 namespace zeropose {
 namespace {
@@ -12,7 +16,9 @@ using std::chrono::steady_clock;
 // An acknowledge later than this may be that of a repeated command: the library sends anew after 500 ms.
 constexpr std::chrono::milliseconds repeated_command{400};
 
-constexpr int trials = 4;
+constexpr std::chrono::seconds health_period{10};
+
+constexpr int trials = 8;  // more than there are buffers: all may be full of frames that nobody asked for
 constexpr std::chrono::milliseconds trial_time{1000};
 
 bool follows(std::uint64_t id, std::uint64_t last) {
@@ -29,14 +35,34 @@ void GigeCamera::fail(const std::string& what, DeviceFault fault) const {
 
 void GigeCamera::start() {
   if (device_.streaming()) return;
+  using Microseconds = std::chrono::duration<double, std::micro>;
+  const auto nanoseconds = [](double us) {
+    return std::chrono::duration_cast<std::chrono::nanoseconds>(Microseconds(us));
+  };
+  exposure_us_ = options_.exposure_us || !triggered_by_us() ? device_.exposure_us() : 0;
+  order_.reset();
+  if (!triggered_by_us())
+    order_.emplace(nanoseconds(exposure_us_),
+                   nanoseconds(options_.trigger == TriggerSource::free_run ? device_.frame_period_us() : 0));
   device_.open_stream();
   prove_stream();
   outstanding_ = suspect_ = false;
 }
 
 // The first frame of a stream is a trial: the library enlarges the socket's buffer when it comes, mostly too
-// late for it, and a trigger that the device kept from before the stream is used up by it.
+// late for it, and a trigger that the device kept from before the stream is used up by it. Nobody can ask for
+// an electric signal: there the first frame may come damaged.
 void GigeCamera::prove_stream() {
+  if (options_.trigger == TriggerSource::software) prove_trigger();
+  if (options_.trigger == TriggerSource::free_run) prove_running();
+}
+
+void GigeCamera::fail_silent() {
+  device_.close_stream();
+  fail("answers, but its frames do not come; check firewall and network", DeviceFault::missing);
+}
+
+void GigeCamera::prove_trigger() {
   std::string problem;
   for (int attempt = 0; attempt < trials; ++attempt) {
     device_.trigger();
@@ -46,9 +72,24 @@ void GigeCamera::prove_stream() {
     problem = frame->problem;
     if (problem.empty() && device_.idle()) return;
   }
+  if (problem.empty()) fail_silent();
   device_.close_stream();
-  if (problem.empty())
-    fail("answers, but its frames do not come; check firewall and network", DeviceFault::missing);
+  ++statistics_.damaged;
+  fail_damaged(problem);
+}
+
+void GigeCamera::prove_running() {
+  const auto period = std::chrono::duration<double, std::micro>(device_.frame_period_us());
+  const TimePoint end =
+      steady_clock::now() + trial_time + trials * std::chrono::ceil<std::chrono::milliseconds>(period);
+  std::string problem;
+  while (const auto frame = device_.receive(end)) {
+    order_->note({frame->first_packet, frame->device_time_ns});
+    problem = frame->problem;
+    if (problem.empty()) return;
+  }
+  if (problem.empty()) fail_silent();
+  device_.close_stream();
   ++statistics_.damaged;
   fail_damaged(problem);
 }
@@ -69,6 +110,11 @@ void GigeCamera::require_heartbeat() const {
 void GigeCamera::trigger() {
   require_heartbeat();
   if (!device_.streaming()) throw std::logic_error("trigger() before start()");
+  if (!triggered_by_us()) {
+    triggered_ = steady_clock::now();
+    outstanding_ = true;
+    return;
+  }
   if (!outstanding_ && !device_.idle()) {
     ++statistics_.stale;
     suspect_ = true;
@@ -104,22 +150,31 @@ void GigeCamera::require_in_sequence(const ReceivedFrame& frame) {
 }
 
 void GigeCamera::require_size(const ReceivedFrame& frame) {
-  const auto bytes =
-      static_cast<std::size_t>(options_.width_px) * static_cast<std::size_t>(options_.height_px);
-  if (frame.mono8 && frame.width_px == options_.width_px && frame.height_px == options_.height_px &&
-      frame.pixels.size() == bytes)
-    return;
+  if (frame.pixels) return;
   suspect_ = true;
   ++statistics_.wrong_size;
+  char format[11];
+  std::snprintf(format, sizeof format, "0x%08x", frame.pixel_format);
   fail("a frame of " + std::to_string(frame.width_px) + "x" + std::to_string(frame.height_px) + " (" +
-           std::to_string(frame.pixels.size()) + " bytes) came, expected " +
-           std::to_string(options_.width_px) + "x" + std::to_string(options_.height_px) +
-           " Mono8; find out what changed its settings",
+           std::to_string(frame.bytes) + " bytes of pixel format " + format + ") came, expected " +
+           std::to_string(options_.width_px) + "x" + std::to_string(options_.height_px) + " " +
+           gige_pixels(options_).name + "; find out what changed its settings",
        DeviceFault::wrong_size);
+}
+
+// What the camera sends with the frame, where it does.
+void GigeCamera::require_exposure(const ReceivedFrame& frame) {
+  if (!options_.exposure_us || !frame.chunk_exposure_us) return;
+  if (std::abs(*frame.chunk_exposure_us - exposure_us_) <= 0.02 * exposure_us_) return;
+  ++statistics_.damaged;
+  fail("a frame was exposed for " + std::to_string(*frame.chunk_exposure_us) + " us instead of " +
+           std::to_string(exposure_us_) + "; find out what changed its settings",
+       DeviceFault::damaged_frame);
 }
 
 std::optional<Frame> GigeCamera::grab(TimePoint deadline) {
   if (!outstanding_) throw std::logic_error("grab() without trigger()");
+  if (!triggered_by_us()) return grab_running(deadline);
   std::optional<ReceivedFrame> received = device_.receive(deadline);
   const TimePoint now = steady_clock::now();
   if (!received) {
@@ -130,25 +185,75 @@ std::optional<Frame> GigeCamera::grab(TimePoint deadline) {
   outstanding_ = false;
   require_whole(*received);
   require_in_sequence(*received);
-  require_size(*received);
+  return hand_out(std::move(*received), now);
+}
+
+// A damaged frame of a camera that runs freely is followed by another one soon.
+std::optional<ReceivedFrame> GigeCamera::receive_begun_after(TimePoint request, TimePoint deadline) {
+  std::string problem;
+  while (auto received = device_.receive(deadline)) {
+    const FrameArrival arrival{received->first_packet, received->device_time_ns};
+    order_->note(arrival);
+    const bool wanted = order_->begun_after(arrival, request);
+    if (wanted && received->problem.empty()) return received;
+    if (received->problem.empty()) {
+      ++statistics_.skipped;
+      continue;
+    }
+    ++statistics_.damaged;
+    problem = received->problem;
+    if (wanted && options_.trigger == TriggerSource::line) break;
+  }
+  require_heartbeat();
+  if (!problem.empty()) fail_damaged(problem);
+  return std::nullopt;
+}
+
+std::optional<Frame> GigeCamera::grab_running(TimePoint deadline) {
+  outstanding_ = false;
+  std::optional<ReceivedFrame> received = receive_begun_after(triggered_, deadline);
+  const TimePoint now = steady_clock::now();
+  if (!received) {
+    ++statistics_.timeouts;
+    return std::nullopt;
+  }
+  last_id_ = received->id;
+  return hand_out(std::move(*received), now);
+}
+
+Frame GigeCamera::hand_out(ReceivedFrame received, TimePoint now) {
+  require_size(received);
+  require_exposure(received);
   ++statistics_.frames;
+  const GigePixels& format = gige_pixels(options_);
   Frame frame;
   frame.camera = options_.name;
   frame.sequence = ++sequence_;
-  frame.device_time_ns = received->device_time_ns;
+  frame.device_time_ns = received.device_time_ns;
+  frame.network_time = statistics_.ptp_state == "Slave" || statistics_.ptp_state == "Master";
   frame.triggered = triggered_;
   frame.received = now;
   frame.width_px = options_.width_px;
   frame.height_px = options_.height_px;
-  frame.stride_bytes = options_.width_px;
-  frame.pixels = own_pixels(std::move(received->pixels));
+  frame.white = format.white;
+  frame.stride_bytes = static_cast<std::ptrdiff_t>(frame.row_bytes());
+  frame.pixels = std::move(received.pixels);
   return frame;
+}
+
+void GigeCamera::look_at_health() {
+  if (steady_clock::now() < next_health_) return;
+  next_health_ = steady_clock::now() + health_period;
+  GigeHealth health = device_.health();
+  statistics_.temperature_c = health.temperature_c;
+  statistics_.ptp_state = std::move(health.ptp_state);
 }
 
 void GigeCamera::check() {
   require_heartbeat();
   device_.require_control();
-  if (!device_.streaming()) return;
+  look_at_health();
+  if (!device_.streaming() || !triggered_by_us()) return;
   if (!outstanding_ && !device_.idle()) {
     ++statistics_.stale;
     suspect_ = true;

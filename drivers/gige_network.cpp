@@ -17,26 +17,13 @@
 #include <memory>
 
 #include "drivers/camera.h"
+#include "drivers/udp_socket.h"
 
 namespace zeropose {
 namespace {
 
 constexpr std::uint16_t control_port = 3956;  // GigE Vision 2.0, GVCP
 constexpr int jumbo_bytes = 9000;
-
-class UdpSocket {
- public:
-  UdpSocket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
-    if (fd_ < 0) throw DeviceError(std::string("no UDP socket: ") + std::strerror(errno));
-  }
-  ~UdpSocket() { ::close(fd_); }
-  UdpSocket(const UdpSocket&) = delete;
-  UdpSocket& operator=(const UdpSocket&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 in_addr parse(const std::string& address) {
   in_addr parsed{};
@@ -64,6 +51,18 @@ in_addr source_towards(const UdpSocket& socket, const std::string& address) {
   if (::getsockname(socket.fd(), std::bit_cast<sockaddr*>(&here), &size) != 0)
     throw DeviceError("no local address towards camera " + address + ": " + std::strerror(errno));
   return here.sin_addr;
+}
+
+in_addr ipv4_of(const sockaddr* address) {
+  sockaddr_in ipv4{};
+  std::memcpy(&ipv4, address, sizeof ipv4);
+  return ipv4.sin_addr;
+}
+
+bool in_network(const ifaddrs& interface, in_addr address) {
+  if (interface.ifa_netmask == nullptr) return false;
+  const in_addr_t mask = ipv4_of(interface.ifa_netmask).s_addr;
+  return ((ipv4_of(interface.ifa_addr).s_addr ^ address.s_addr) & mask) == 0;
 }
 
 int mtu_of(const UdpSocket& socket, const std::string& name) {
@@ -120,23 +119,38 @@ bool receive_buffer_allowed(int bytes) {
   return got / 2 >= bytes;  // the kernel doubles what it is asked for
 }
 
-NetworkInterface interface_towards(const std::string& address) {
+bool packet_socket_allowed() {
+  const int fd = ::socket(AF_PACKET, SOCK_RAW | SOCK_CLOEXEC, 0);
+  if (fd >= 0) ::close(fd);
+  return fd >= 0;
+}
+
+NetworkInterface interface_towards(const std::string& address, const std::string& wanted) {
   const UdpSocket socket;
-  const in_addr source = source_towards(socket, address);
+  const in_addr there = parse(address);
+  const in_addr source = wanted.empty() ? source_towards(socket, address) : in_addr{};
   ifaddrs* list = nullptr;
   if (::getifaddrs(&list) != 0)
     throw DeviceError(std::string("network interfaces cannot be listed: ") + std::strerror(errno));
   const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> owner(list, &::freeifaddrs);
+  const ifaddrs* best = nullptr;
   for (const ifaddrs* entry = list; entry != nullptr; entry = entry->ifa_next) {
     if (entry->ifa_addr == nullptr || entry->ifa_addr->sa_family != AF_INET) continue;
-    sockaddr_in own{};
-    std::memcpy(&own, entry->ifa_addr, sizeof own);
-    if (own.sin_addr.s_addr != source.s_addr) continue;
-    char text[INET_ADDRSTRLEN] = {};
-    ::inet_ntop(AF_INET, &source, text, sizeof text);
-    return {entry->ifa_name, text, mtu_of(socket, entry->ifa_name), (entry->ifa_flags & IFF_LOOPBACK) != 0};
+    const bool wanted_one =
+        wanted.empty() ? ipv4_of(entry->ifa_addr).s_addr == source.s_addr : wanted == entry->ifa_name;
+    if (wanted_one && (best == nullptr || (!in_network(*best, there) && in_network(*entry, there))))
+      best = entry;
   }
-  throw DeviceError("no network interface of this machine leads to camera " + address);
+  if (best == nullptr && wanted.empty())
+    throw DeviceError("no network interface of this machine leads to camera " + address);
+  if (best == nullptr)
+    throw DeviceError("network interface " + wanted +
+                      " is missing or without an IPv4 address; correct "
+                      "network.interface in the cell file, `ip addr` shows what there is");
+  char text[INET_ADDRSTRLEN] = {};
+  const in_addr own = ipv4_of(best->ifa_addr);
+  ::inet_ntop(AF_INET, &own, text, sizeof text);
+  return {best->ifa_name, text, mtu_of(socket, best->ifa_name), (best->ifa_flags & IFF_LOOPBACK) != 0};
 }
 
 int largest_packet_bytes(const NetworkInterface& interface) {

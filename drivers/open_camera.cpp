@@ -11,11 +11,14 @@ CameraStatistics operator+(const CameraStatistics& a, const CameraStatistics& b)
           a.damaged + b.damaged,
           a.wrong_size + b.wrong_size,
           a.stale + b.stale,
+          a.skipped + b.skipped,
           a.renewals + b.renewals,
           a.failures + b.failures,
           a.underruns + b.underruns,
           a.resent_packets + b.resent_packets,
-          a.missing_packets + b.missing_packets};
+          a.missing_packets + b.missing_packets,
+          b.temperature_c ? b.temperature_c : a.temperature_c,
+          b.ptp_state.empty() ? a.ptp_state : b.ptp_state};
 }
 
 std::shared_ptr<const std::uint8_t> own_pixels(std::vector<std::uint8_t> pixels) {

@@ -45,6 +45,39 @@ struct Unref {
   void operator()(gpointer object) const { g_object_unref(object); }
 };
 
+constexpr int bits_of(ArvPixelFormat format) {
+  switch (format) {
+    case ARV_PIXEL_FORMAT_MONO_10:
+    case ARV_PIXEL_FORMAT_MONO_10_PACKED:
+      return 10;
+    case ARV_PIXEL_FORMAT_MONO_12:
+    case ARV_PIXEL_FORMAT_MONO_12_PACKED:
+      return 12;
+    default:
+      return 16;
+  }
+}
+
+// As GigE Vision sends them: two bytes, the lower one first; or packed, where the first pixel of a pair has
+// the first byte for its upper eight bits and the lower half of the second for the rest, the other pixel the
+// third byte and the upper half.
+void write_deep(std::span<const std::uint8_t> grey, ArvPixelFormat format, std::uint8_t* out) {
+  const int bits = bits_of(format);
+  const bool packed = ARV_PIXEL_FORMAT_BIT_PER_PIXEL(format) == 12;
+  for (std::size_t i = 0; i < grey.size(); ++i) {
+    const unsigned level = grey[i] * 257u >> (16 - bits);
+    if (!packed) {
+      out[2 * i] = static_cast<std::uint8_t>(level & 255u);
+      out[2 * i + 1] = static_cast<std::uint8_t>(level >> 8);
+      continue;
+    }
+    std::uint8_t* three = out + i / 2 * 3;
+    const unsigned rest = level & ((1u << (bits - 8)) - 1);
+    three[i % 2 == 0 ? 0 : 2] = static_cast<std::uint8_t>(level >> (bits - 8));
+    three[1] = static_cast<std::uint8_t>(i % 2 == 0 ? rest : three[1] | rest << 4);
+  }
+}
+
 // The fake binds its sockets without telling when it cannot.
 void require_free(const ServedCamera& camera) {
   const std::string who = "camera " + camera.name + ": ";
@@ -82,9 +115,11 @@ struct GigeServer::Slot {
 
 void GigeServer::Slot::start() {
   require_free(camera);
-  const std::string serial = "ZP-" + camera.address;  // must differ
+  const std::string serial = camera.serial.empty() ? "ZP-" + camera.address : camera.serial;  // must differ
   std::unique_ptr<ArvGvFakeCamera, Unref> made(
-      arv_gv_fake_camera_new(camera.address.c_str(), serial.c_str()));
+      camera.genicam.empty()
+          ? arv_gv_fake_camera_new(camera.address.c_str(), serial.c_str())
+          : arv_gv_fake_camera_new_full(camera.address.c_str(), serial.c_str(), camera.genicam.c_str()));
   if (made == nullptr || !arv_gv_fake_camera_is_running(made.get()))
     throw std::runtime_error("camera " + camera.name + ": address " + camera.address +
                              " is on no network interface; as root: ip addr add " + camera.address +
@@ -96,13 +131,20 @@ void GigeServer::Slot::start() {
   arv_fake_camera_write_register(registers(), ARV_FAKE_CAMERA_REGISTER_WIDTH, width);
   arv_fake_camera_write_register(registers(), ARV_FAKE_CAMERA_REGISTER_HEIGHT, height);
   arv_fake_camera_set_trigger_frequency(registers(), trigger_grid_hz);
-  const auto fill = [](ArvBuffer* buffer, void* slot_pointer, guint32, guint32, ArvPixelFormat) {
+  constexpr guint32 user_name_register = 0xe8;  // GigE Vision 2.0, bootstrap
+  if (!camera.user_name.empty())
+    arv_fake_camera_write_memory(registers(), user_name_register,
+                                 static_cast<guint32>(camera.user_name.size() + 1), camera.user_name.c_str());
+  const auto fill = [](ArvBuffer* buffer, void* slot_pointer, guint32, guint32, ArvPixelFormat format) {
     auto* slot = static_cast<Slot*>(slot_pointer);
     std::size_t unknown = 0;  // the library reports no size yet
     auto* data = static_cast<std::uint8_t*>(const_cast<void*>(arv_buffer_get_data(buffer, &unknown)));
     const auto bytes = static_cast<std::size_t>(arv_buffer_get_image_width(buffer)) *
                        static_cast<std::size_t>(arv_buffer_get_image_height(buffer));
-    slot->server->expose(*slot, {data, bytes});
+    if (ARV_PIXEL_FORMAT_BIT_PER_PIXEL(format) == 8) return slot->server->expose(*slot, {data, bytes});
+    std::vector<std::uint8_t> grey(bytes);
+    slot->server->expose(*slot, grey);
+    write_deep(grey, format, data);
   };
   arv_fake_camera_set_fill_pattern(registers(), fill, this);
 }
@@ -235,6 +277,20 @@ void GigeServer::send_narrower(std::size_t camera, int width_px) {
   if (slot.device)
     arv_fake_camera_write_register(slot.registers(), ARV_FAKE_CAMERA_REGISTER_WIDTH,
                                    static_cast<guint32>(width_px));
+}
+
+std::uint32_t GigeServer::read_register(std::size_t camera, std::uint32_t address) const {
+  const Slot& slot = *slots_.at(camera);
+  const std::lock_guard control(slot.control);
+  guint32 value = 0;
+  if (slot.device) arv_fake_camera_read_register(slot.registers(), address, &value);
+  return value;
+}
+
+void GigeServer::write_register(std::size_t camera, std::uint32_t address, std::uint32_t value) {
+  const Slot& slot = *slots_.at(camera);
+  const std::lock_guard control(slot.control);
+  if (slot.device) arv_fake_camera_write_register(slot.registers(), address, value);
 }
 
 void GigeServer::run_free(std::size_t camera, double frames_per_second) {

@@ -18,13 +18,18 @@ struct ServedCamera {
   std::string name;     // for messages
   std::string address;  // IPv4, must be on an interface of this machine
   int width_px = 0, height_px = 0;
+  std::string serial = {};     // empty: ZP-ADDRESS
+  std::string user_name = {};  // DeviceUserID, at most 15 characters
+  std::string genicam = {};    // file that describes its features; empty: the library's own
 };
 
 // Cameras that expose when they are triggered by software. Every exposure shows a picture of its own, drawn
 // ahead of it by one thread. Public calls may come from any thread.
 class GigeServer {
  public:
-  // Fills width * height grey levels; called from one thread only, anew for every frame.
+  // Fills width * height grey levels of 0..255, whatever the pixel format: that has white at its own highest
+  // value, and the same share of white. Called from one thread only, anew for
+  // every frame.
   using Draw = std::function<void(std::size_t camera, std::span<std::uint8_t> pixels)>;
 
   // Throws std::runtime_error: an address is on no interface (says how to add it) or already served.
@@ -43,6 +48,10 @@ class GigeServer {
   void lose_packets(std::size_t camera, double ratio);          // 0..1 of the stream packets
   void send_narrower(std::size_t camera, int width_px);         // frames of another width from the next on
   void run_free(std::size_t camera, double frames_per_second);  // exposes unasked; 0: triggered again
+
+  // Registers of the camera (ARV_FAKE_CAMERA_REGISTER_...); a stopped one reads 0.
+  std::uint32_t read_register(std::size_t camera, std::uint32_t address) const;
+  void write_register(std::size_t camera, std::uint32_t address, std::uint32_t value);
 
  private:
   struct Slot;

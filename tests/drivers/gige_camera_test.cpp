@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "tests/drivers/gige_test.h"
 #include "tests/drivers/numbered_cameras.h"
 
 namespace zeropose {
@@ -11,25 +12,6 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::steady_clock;
 using ::testing::HasSubstr;
-
-TimePoint in(std::chrono::milliseconds time) { return steady_clock::now() + time; }
-
-std::optional<Frame> triggered_frame(Camera& camera) {
-  camera.trigger();
-  return camera.grab(in(3s));
-}
-
-// The fault and the message of a call that must fail.
-template <class Call>
-std::pair<DeviceFault, std::string> failure(Call call) {
-  try {
-    call();
-  } catch (const DeviceError& error) {
-    return {error.fault(), error.what()};
-  }
-  ADD_FAILURE() << "no DeviceError";
-  return {};
-}
 
 class OneCamera : public ::testing::Test {
  protected:

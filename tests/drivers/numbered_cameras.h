@@ -43,9 +43,10 @@ inline bool all_of_one_scene(const Frame& frame) {
 
 class NumberedCameras {
  public:
-  explicit NumberedCameras(std::size_t count, int width_px = 768, int height_px = 572)
+  explicit NumberedCameras(std::size_t count, int width_px = 768, int height_px = 572,
+                           const std::string& genicam = {})
       : options_(options_for(count, width_px, height_px)),
-        server_(served(options_),
+        server_(served(options_, genicam),
                 [this](std::size_t camera, std::span<std::uint8_t> pixels) { draw(camera, pixels); }) {}
 
   const CameraOptions& options(std::size_t camera) const { return options_[camera]; }
@@ -72,10 +73,15 @@ class NumberedCameras {
   }
 
  private:
-  static std::vector<ServedCamera> served(const std::vector<CameraOptions>& all) {
+  static std::vector<ServedCamera> served(const std::vector<CameraOptions>& all, const std::string& genicam) {
     std::vector<ServedCamera> cameras;
     for (const CameraOptions& options : all)
-      cameras.push_back({options.name, options.gige.address, options.width_px, options.height_px});
+      cameras.push_back({.name = options.name,
+                         .address = options.gige.address,
+                         .width_px = options.width_px,
+                         .height_px = options.height_px,
+                         .user_name = "user-" + options.name,
+                         .genicam = genicam});
     return cameras;
   }
 
