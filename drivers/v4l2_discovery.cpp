@@ -31,7 +31,7 @@ std::string link_to(const fs::path& device, const char* folder) {
 }
 
 std::optional<FoundV4l2Camera> look_at(const fs::path& device) {
-  const V4l2Handle handle(device.c_str());
+  const V4l2Handle handle(device.string());
   v4l2_capability capability{};
   if (!handle.is_open() || handle.call(VIDIOC_QUERYCAP, &capability) != 0) return std::nullopt;
   const bool own = (capability.capabilities & V4L2_CAP_DEVICE_CAPS) != 0;

@@ -6,11 +6,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 
 namespace zeropose {
 
-V4l2Handle::V4l2Handle(const char* path) : fd_(::open(path, O_RDWR | O_NONBLOCK | O_CLOEXEC)) {}
+V4l2Handle::V4l2Handle(const std::string& path, std::string where)
+    : fd_(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)), where_(std::move(where)) {}
 
 void V4l2Handle::close() noexcept {
   if (fd_ >= 0) ::close(std::exchange(fd_, -1));
@@ -35,6 +38,19 @@ V4l2Handle::Ready V4l2Handle::wait(TimePoint deadline) const {
     if (ready > 0) return Ready::frame;
     if (std::chrono::steady_clock::now() >= deadline) return Ready::deadline;
   }
+}
+
+void V4l2Handle::fail(const std::string& what, DeviceFault fault) const {
+  throw DeviceError(where_ + ": " + what, fault);
+}
+
+void V4l2Handle::require(int error, const std::string& doing) const {
+  if (error == 0) return;
+  if (error == EBUSY)
+    fail(doing + " failed: another program uses the device; stop that program", DeviceFault::in_use);
+  if (error == ENODEV || error == ENXIO)
+    fail("is gone; check its power and cable. It is used again as soon as it is back");
+  fail(doing + " failed: " + std::strerror(error) + "; check the device with v4l2-ctl --all");
 }
 
 }  // namespace zeropose

@@ -1,7 +1,7 @@
 // An opened V4L2 device file: the owner of its descriptor and of the calls into the driver.
 #pragma once
 
-#include <cerrno>
+#include <string>
 #include <utility>
 
 #include "drivers/camera.h"
@@ -13,15 +13,15 @@ namespace zeropose {
 class V4l2Handle {
  public:
   V4l2Handle() = default;
-  // Opens it for reading and writing, without blocking calls; not open() afterwards on failure, see errno.
-  explicit V4l2Handle(const char* path);
+  // Opens it for reading and writing, without blocking calls; not is_open() on failure, errno says why.
+  // `where` is how messages begin.
+  explicit V4l2Handle(const std::string& path, std::string where = {});
   ~V4l2Handle() { close(); }
-  V4l2Handle(V4l2Handle&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+  V4l2Handle(V4l2Handle&& other) noexcept
+      : fd_(std::exchange(other.fd_, -1)), where_(std::move(other.where_)) {}
   V4l2Handle& operator=(V4l2Handle&& other) noexcept {
-    if (this != &other) {
-      close();
-      fd_ = std::exchange(other.fd_, -1);
-    }
+    std::swap(fd_, other.fd_);
+    std::swap(where_, other.where_);
     return *this;
   }
 
@@ -34,9 +34,14 @@ class V4l2Handle {
   // Until a buffer is filled, an event has come or the device reports an error; an event comes first.
   Ready wait(TimePoint deadline) const;
 
+  [[noreturn]] void fail(const std::string& what, DeviceFault fault = DeviceFault::missing) const;
+  // Throws DeviceError for an error number: another program has it, it is gone, or what the system says.
+  void require(int error, const std::string& doing) const;
+
  private:
   void close() noexcept;
   int fd_ = -1;
+  std::string where_;
 };
 
 }  // namespace zeropose
