@@ -2,6 +2,7 @@
 
 #include "drivers/camera.h"
 #include "drivers/gige_camera.h"
+#include "drivers/v4l2_camera.h"
 
 namespace zeropose {
 
@@ -45,6 +46,7 @@ std::unique_ptr<Camera> open_camera(const CameraOptions& options) {
     case CameraDriver::gige:
       return std::make_unique<GigeCamera>(options);
     case CameraDriver::v4l2:
+      return std::make_unique<V4l2Camera>(options);
     case CameraDriver::folder:
       break;
   }
