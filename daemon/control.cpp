@@ -48,6 +48,23 @@ Json check_json(const CameraCheck& check) {
           {"farthest_px", check.farthest_px}};
 }
 
+Json trend_json(const HealthTrend& trend) {
+  return {{"mean", trend.mean}, {"first", trend.first}, {"ratio", trend.ratio()}, {"changed", trend.changed}};
+}
+
+// null before the first picture.
+Json health_json(const CameraHealth& health) {
+  if (!health.seen) return nullptr;
+  const PictureHealth& picture = health.picture;
+  return {{"noise_grey", picture.noise_grey},
+          {"saturated_share", picture.saturated_share},
+          {"dark_share", picture.dark_share},
+          {"mean_grey", picture.mean_grey},
+          {"focus_px", picture.focus_px ? Json(*picture.focus_px) : Json()},
+          {"focus_trend", trend_json(health.focus)},
+          {"noise_trend", trend_json(health.noise)}};
+}
+
 Json status_answer(Cycle& cycle) {
   const Status status = cycle.status();
   Json cameras = Json::array();
@@ -56,6 +73,7 @@ Json status_answer(Cycle& cycle) {
                        {"alive", camera.state == CameraState::alive},
                        {"last_problem", camera.last_problem},
                        {"references", check_json(camera.check)},
+                       {"health", health_json(camera.health)},
                        {"frames", camera.statistics.frames},
                        {"timeouts", camera.statistics.timeouts},
                        {"damaged", camera.statistics.damaged}});
@@ -127,6 +145,10 @@ Json measure_answer(Cycle& cycle) {
   answer["compute_ms"] = milliseconds(outcome.compute);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
   answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
+  answer["cameras"] = Json::array();
+  for (std::size_t i = 0; i < outcome.health.size(); ++i)
+    answer["cameras"].push_back(
+        {{"name", outcome.frames[i].camera}, {"health", health_json(outcome.health[i])}});
   if (m.code != Code::ok) return answer;
   answer["X_O0O"] = six(m.X_O0O);
   answer["X_WO"] = six(m.pose.X_WO);
