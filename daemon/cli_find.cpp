@@ -79,10 +79,10 @@ void check(const Options& options) {
 
 Pattern taught(const Options& options) {
   if (options.kind != "template") return {};
-  const GreyImage image = load_deep_image(options.pattern);
+  const StoredPicture image = load_deep_image(options.pattern);
   const Eigen::Vector2d middle(0.5 * (image.width_px - 1), 0.5 * (image.height_px - 1));
   const Eigen::Vector2d clicked = options.click.empty() ? middle : Eigen::Vector2d(options.click.data());
-  Pattern pattern = teach_pattern(image.view(), {0, 0, image.width_px - 1, image.height_px - 1}, clicked);
+  Pattern pattern = teach_pattern(view_of(image), {0, 0, image.width_px - 1, image.height_px - 1}, clicked);
   if (pattern.status != PatternStatus::taught)
     throw std::invalid_argument(
         concat({options.pattern, ": this patch is no mark: ", name_of(pattern.status)}));
@@ -131,13 +131,13 @@ void write_overlay(const Options& options, const ImageView& image, const MarkSea
 
 Answer find(const Options& options) {
   check(options);
-  const GreyImage picture = load_deep_image(options.image);
+  const StoredPicture picture = load_deep_image(options.image);
   const Pattern pattern = taught(options);
-  const MarkSearch search = search_of(options, picture.view(), pattern);
-  const AllMarks marks = find_all_marks(picture.view(), search);
+  const MarkSearch search = search_of(options, view_of(picture), pattern);
+  const AllMarks marks = find_all_marks(view_of(picture), search);
   if (marks.found.empty() && marks.nearest.status == MarkStatus::not_searched)
     throw std::invalid_argument(reason_text(marks.nearest, search));
-  if (!options.overlay.empty()) write_overlay(options, picture.view(), search, marks);
+  if (!options.overlay.empty()) write_overlay(options, view_of(picture), search, marks);
   if (marks.found.empty()) {
     Answer answer = failure(reason_text(marks.nearest, search));
     answer.json["name"] = name_of(marks.nearest.status);

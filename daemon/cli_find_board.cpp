@@ -98,11 +98,11 @@ BoardKind kind_of(const std::string& name) {
 
 Answer find(Options options) {
   options.problem.kind = kind_of(options.board);
-  const GreyImage image = load_grey_image(options.image);
-  const BoardResult result = find_board(image.view(), options.problem);
+  const StoredPicture image = load_grey_image(options.image);
+  const BoardResult result = find_board(view_of(image), options.problem);
   if (result.status == BoardStatus::wrong_problem) throw std::invalid_argument(result.reason);
   if (!options.overlay.empty()) {
-    const std::vector<std::uint8_t> png = overlay_png(image.view(), result);
+    const std::vector<std::uint8_t> png = overlay_png(view_of(image), result);
     write_file(options.overlay, reinterpret_cast<const char*>(png.data()), png.size());
   }
   const bool good = result.status == BoardStatus::found;

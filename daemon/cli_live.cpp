@@ -68,13 +68,32 @@ std::string stand_text(const Json& camera) {
          references["expected"].dump() + " seen)";
 }
 
+std::string change_text(const Json& health, const char* key, const char* what) {
+  const Json& trend = health[key];
+  if (!trend["changed"]) return {};
+  return std::string(", ") + what + " CHANGED from " + short_text(trend["first"]) + " to " +
+         short_text(trend["mean"]);
+}
+
+// What its pictures say; nothing before the first.
+std::string health_text(const Json& camera) {
+  const Json health = camera.value("health", Json());
+  if (!health.is_object()) return {};
+  return "\n    noise " + short_text(health["noise_grey"]) + " grey, mean " +
+         short_text(health["mean_grey"]) + ", saturated " +
+         short_text(100 * health["saturated_share"].get<double>()) + " %, focus " +
+         (health["focus_px"].is_null() ? "unknown" : short_text(health["focus_px"]) + " px") +
+         change_text(health, "focus_trend", "blur of the marks") +
+         change_text(health, "noise_trend", "noise");
+}
+
 void print_status(const Json& answer) {
   std::cout << "cell " << text_or(answer, "cell") << (answer["simulated"] ? " (simulated)" : "") << ", job "
             << text_or(answer, "job") << ": " << (answer["ready"] ? "ready" : "NOT READY") << '\n';
   for (const auto& camera : answer["cameras"])
     std::cout << "  " << text_or(camera, "name") << ": "
               << (camera["alive"] ? "there" : "MISSING: " + text_or(camera, "last_problem"))
-              << stand_text(camera) << '\n';
+              << stand_text(camera) << health_text(camera) << '\n';
   if (answer.contains("zero"))
     std::cout << "  zero: " << text_or(answer["zero"], "time") << '\n';
   else

@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/cli_batch.h"
+#include "daemon/cli_cameras.h"
 #include "daemon/cli_live.h"
 #include "daemon/version.h"
 
@@ -12,6 +13,7 @@ int main(int argc, char** argv) {
   int exit_status = 0;
   zeropose::add_live_verbs(app, exit_status);
   zeropose::add_batch_verbs(app, exit_status);
+  zeropose::add_cameras(app, exit_status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -52,12 +52,30 @@ Json check_json(const CameraCheck& check) {
           {"farthest_px", check.farthest_px}};
 }
 
+Json trend_json(const HealthTrend& trend) {
+  return {{"mean", trend.mean}, {"first", trend.first}, {"ratio", trend.ratio()}, {"changed", trend.changed}};
+}
+
+// null before the first picture.
+Json health_json(const CameraHealth& health) {
+  if (!health.seen) return nullptr;
+  const PictureHealth& picture = health.picture;
+  return {{"noise_grey", picture.noise_grey},
+          {"saturated_share", picture.saturated_share},
+          {"dark_share", picture.dark_share},
+          {"mean_grey", picture.mean_grey},
+          {"focus_px", picture.focus_px ? Json(*picture.focus_px) : Json()},
+          {"focus_trend", trend_json(health.focus)},
+          {"noise_trend", trend_json(health.noise)}};
+}
+
 Json camera_json(const CameraStatus& camera) {
   const CameraStatistics& counted = camera.statistics;
   Json json{{"name", camera.name},
             {"alive", camera.state == CameraState::alive},
             {"last_problem", camera.last_problem},
             {"references", check_json(camera.check)},
+            {"health", health_json(camera.health)},
             {"frames", counted.frames},
             {"timeouts", counted.timeouts},
             {"damaged", counted.damaged},
@@ -142,6 +160,10 @@ Json measure_answer(Cycle& cycle) {
   if (outcome.device_spread) answer["device_spread_us"] = microseconds(*outcome.device_spread);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
   answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
+  answer["cameras"] = Json::array();
+  for (std::size_t i = 0; i < outcome.health.size(); ++i)
+    answer["cameras"].push_back(
+        {{"name", outcome.frames[i].camera}, {"health", health_json(outcome.health[i])}});
   if (m.code != Code::ok) return answer;
   answer["X_O0O"] = six(m.X_O0O);
   answer["X_WO"] = six(m.pose.X_WO);

@@ -144,8 +144,8 @@ void Cycle::refresh() {
   now.cameras_known = true;
   for (std::size_t i = 0; i < grabber_.size(); ++i) {
     const CameraWorker& worker = grabber_.camera(i);
-    now.cameras.push_back(
-        {cell_.cameras[i].name, worker.state(), worker.last_problem(), worker.statistics(), checks_[i]});
+    now.cameras.push_back({cell_.cameras[i].name, worker.state(), worker.last_problem(), worker.statistics(),
+                           checks_[i], health_[i]});
     now.cameras_known = now.cameras_known && now.cameras[i].state != CameraState::opening;
   }
   CellState cell;
@@ -173,6 +173,7 @@ void Cycle::refresh() {
 void Cycle::forget_checks() {
   trend_ = {};
   checks_.assign(cell_.cameras.size(), {});
+  health_.assign(cell_.cameras.size(), {});
 }
 
 bool Cycle::a_camera_moved() const {
@@ -303,9 +304,11 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
   outcome.device_spread = grabbed.device_spread;
   on_exposed();
   const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
-  m = zeropose::measure({images_of(cameras, outcome.frames), job, cell_.calibration, zero->zero, X_O0O_last_,
-                         references, &trend_});
+  const auto images = images_of(cameras, outcome.frames);
+  m = zeropose::measure({images, job, cell_.calibration, zero->zero, X_O0O_last_, references, &trend_});
   remember(m.references);
+  follow_health(health_, images, m, job, cell_);
+  for (const std::size_t camera : cameras) outcome.health.push_back(health_[camera]);
   outcome.compute = Clock::now() - computing;
   return outcome;
 }

@@ -13,6 +13,7 @@
 
 #include "config/cell.h"
 #include "config/records.h"
+#include "daemon/camera_health.h"
 #include "daemon/grab.h"
 #include "daemon/overlay.h"
 #include "measure/measurement.h"
@@ -24,7 +25,8 @@ namespace zeropose {
 struct MeasureOutcome {
   const Job* job = nullptr;  // of the cell
   Measurement measurement;
-  std::vector<Frame> frames;  // in the order of the job's cameras; empty when the grab failed
+  std::vector<Frame> frames;         // in the order of the job's cameras; empty when the grab failed
+  std::vector<CameraHealth> health;  // of these cameras, likewise
   std::chrono::nanoseconds grab{}, compute{};
   std::chrono::nanoseconds trigger_spread{};              // of the frames, as in FrameSet
   std::optional<std::chrono::nanoseconds> device_spread;  // likewise
@@ -48,7 +50,8 @@ struct CameraStatus {
   CameraState state = CameraState::opening;
   std::string last_problem;
   CameraStatistics statistics;
-  CameraCheck check;  // its reference points, when they were last looked at
+  CameraCheck check;    // its reference points, when they were last looked at
+  CameraHealth health;  // of its pictures
 };
 
 struct Status {
@@ -122,8 +125,9 @@ class Cycle {
   // The last result that a robot was sent as valid: what the step limit compares with. None after the start,
   // a new zero, a change of job and a Reset.
   std::optional<Pose> X_O0O_last_;
-  ReferenceTrend trend_;             // since the zero of the selected job
-  std::vector<CameraCheck> checks_;  // by camera, when its references were last looked at
+  ReferenceTrend trend_;              // since the zero of the selected job
+  std::vector<CameraCheck> checks_;   // by camera, when its references were last looked at
+  std::vector<CameraHealth> health_;  // by camera
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

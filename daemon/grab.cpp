@@ -4,6 +4,13 @@
 
 namespace zeropose {
 
+namespace {
+
+// Of a folder the same picture may come again.
+bool is_live(const CameraOptions& camera) { return camera.driver != CameraDriver::folder; }
+
+}  // namespace
+
 Code code_of(GrabStatus status) {
   switch (status) {
     case GrabStatus::ok:
@@ -61,7 +68,7 @@ FrameSet Grabber::grab_live(std::span<const std::size_t> cameras, TimePoint dead
   }
   if (set.code == Code::ok)
     for (std::size_t i = 0; i < cameras.size(); ++i)
-      if (pictures_.repeats(cameras[i], set.frames[i]))
+      if (is_live(workers_[cameras[i]]->camera()) && pictures_.repeats(cameras[i], set.frames[i]))
         fail(Code::frame_frozen, set.frames[i].camera + " delivered the same picture as before, bit for bit");
   if (set.code != Code::ok) set.frames.clear();
   set.trigger_spread = trigger_spread(set.frames);

@@ -1,7 +1,9 @@
 #include <utility>
 
 #include "drivers/camera.h"
+#include "drivers/folder_camera.h"
 #include "drivers/gige_camera.h"
+#include "drivers/v4l2_camera.h"
 
 namespace zeropose {
 
@@ -48,8 +50,9 @@ std::unique_ptr<Camera> open_camera(const CameraOptions& options) {
     case CameraDriver::gige:
       return std::make_unique<GigeCamera>(options);
     case CameraDriver::v4l2:
+      return std::make_unique<V4l2Camera>(options);
     case CameraDriver::folder:
-      break;
+      return std::make_unique<FolderCamera>(options);
   }
   throw DeviceError(title_of(options) + ": this build has no such driver");
 }

@@ -53,10 +53,21 @@ MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double s
   return search;
 }
 
+// Its place among the images; their number: there is none.
+std::size_t place_of(std::span<const CameraImage> images, std::size_t camera) {
+  return static_cast<std::size_t>(std::ranges::find(images, camera, &CameraImage::camera) - images.begin());
+}
+
 const ImageView* image_of(std::span<const CameraImage> images, std::size_t camera) {
+  const std::size_t place = place_of(images, camera);
+  return place < images.size() ? &images[place].image : nullptr;
+}
+
+std::vector<PictureHealth> health_of(std::span<const CameraImage> images) {
+  std::vector<PictureHealth> health;
   for (const CameraImage& image : images)
-    if (image.camera == camera) return &image.image;
-  return nullptr;
+    health.push_back(image.image.data != nullptr ? picture_health(image.image) : PictureHealth{});
+  return health;
 }
 
 // O0 in the plane of a sheet as x, y and rz alone; what is left of the others is rounding.
@@ -90,8 +101,8 @@ Verdict check_zero(const Job& job, const Zero& zero) {
   return {Code::ok, {}};
 }
 
-Verdict check_images(std::span<const CameraImage> images, const Job& job,
-                     std::span<const CalibratedCamera> cameras) {
+Verdict check_images(std::span<const CameraImage> images, std::span<const PictureHealth> health,
+                     const Job& job, std::span<const CalibratedCamera> cameras) {
   std::vector<bool> checked(cameras.size());
   for (const View& view : job.views) {
     if (view.camera >= cameras.size() || view.mark >= job.marks.size())
@@ -107,7 +118,8 @@ Verdict check_images(std::span<const CameraImage> images, const Job& job,
                                           number(image->height_px) + " px, it is calibrated for " +
                                           number(camera.model.width_px) + " x " +
                                           number(camera.model.height_px)};
-    if (Verdict verdict = check_image(*image, camera.name); verdict.code != Code::ok) return verdict;
+    Verdict verdict = check_image(health[place_of(images, view.camera)], camera.name);
+    if (verdict.code != Code::ok) return verdict;
   }
   return {Code::ok, {}};
 }
@@ -307,11 +319,24 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
   return observations;
 }
 
+std::optional<double> mark_blur_px(std::span<const MarkFinding> findings, const Job& job,
+                                   std::size_t camera) {
+  double sum = 0;
+  int count = 0;
+  for (std::size_t i = 0; i < findings.size() && i < job.views.size(); ++i) {
+    if (job.views[i].camera != camera || findings[i].status != MarkStatus::found) continue;
+    sum += findings[i].blur_px;
+    ++count;
+  }
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
 Measurement measure(const MeasurementProblem& problem) {
   const auto& [images, job, cameras, zero, X_O0O_last, references, trend] = problem;
   Measurement measurement;
+  measurement.health = health_of(images);
   if (!passes(measurement, check_zero(job, zero))) return measurement;
-  if (!passes(measurement, check_images(images, job, cameras))) return measurement;
+  if (!passes(measurement, check_images(images, measurement.health, job, cameras))) return measurement;
   look_at_references(measurement, problem);
   if (!cameras_stand(measurement, false)) return measurement;
   const Job now = compensated(job, zero);

@@ -8,6 +8,7 @@
 
 #include "measure/image.h"
 #include "measure/job.h"
+#include "measure/picture_health.h"
 #include "measure/pose.h"
 #include "measure/references.h"
 #include "measure/zero.h"
@@ -23,6 +24,7 @@ struct CameraImage {
 struct Measurement {
   Code code = Code::internal;
   std::string reason;                     // one sentence with the numbers, empty when ok
+  std::vector<PictureHealth> health;      // one per image
   std::vector<MarkFinding> findings;      // one per view of the job
   std::vector<Observation> observations;  // the findings that were found
   PoseResult pose;
@@ -46,6 +48,10 @@ std::vector<Observation> observations_of(std::span<const MarkFinding> findings, 
 // Finds the marks only: the first step of measure() and all that a zero measurement needs of a frame.
 std::vector<MarkFinding> find_job_marks(std::span<const CameraImage> images, const Job& job,
                                         std::span<const CalibratedCamera> cameras, const Pose& X_WO_expected);
+
+// The mean blur of the marks that were found in a camera, sigma in px: its focus where it counts. nullopt:
+// none was found.
+std::optional<double> mark_blur_px(std::span<const MarkFinding> findings, const Job& job, std::size_t camera);
 
 // What one measurement is made from. Everything is borrowed.
 struct MeasurementProblem {

@@ -11,7 +11,6 @@
 namespace zeropose {
 namespace {
 
-constexpr int white_grey = 254, black_grey = 12;
 constexpr double max_white_share = 0.5;    // of the pixels
 constexpr double min_bright_share = 0.01;  // of the pixels, above black
 // What arithmetic leaves of a value that is its limit, mm and deg: far below the last digit of the wire.
@@ -78,26 +77,15 @@ Place furthest(const Job& job, const Pose& X_O0O_from, const Pose& X_O0O_to) {
 
 }  // namespace
 
-Verdict check_image(const ImageView& image, const std::string& name) {
-  constexpr int stride = 4;
-  std::size_t pixels = 0, white = 0, bright = 0;
-  for (int v = 0; v < image.height_px; v += stride) {
-    for (int u = 0; u < image.width_px; u += stride) {
-      ++pixels;
-      white += image.grey_at(u, v) >= white_grey;
-      bright += image.grey_at(u, v) > black_grey;
-    }
-  }
-  const double count = static_cast<double>(std::max<std::size_t>(pixels, 1));
-  const double white_share = static_cast<double>(white) / count,
-               bright_share = static_cast<double>(bright) / count;
+Verdict check_image(const PictureHealth& health, const std::string& name) {
+  const double white_share = health.saturated_share, bright_share = 1 - health.dark_share;
   if (white_share > max_white_share)
     return {Code::image_saturated, name + ": " + number(100 * white_share, 0) +
                                        " % of the picture are white, allowed are " +
                                        number(100 * max_white_share, 0) + " %"};
   if (bright_share < min_bright_share)
     return {Code::image_dark, name + ": " + number(100 * bright_share, 1) +
-                                  " % of the picture are brighter than grey level " + number(black_grey) +
+                                  " % of the picture are brighter than grey level " + number(dark_grey) +
                                   ", needed are " + number(100 * min_bright_share, 1) + " %"};
   return good();
 }

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "measure/code.h"
-#include "measure/image.h"
 #include "measure/job.h"
+#include "measure/picture_health.h"
 #include "measure/pose.h"
 #include "measure/reliability.h"
 
@@ -21,7 +21,7 @@ struct Verdict {
 
 // M6.1, as far as pixels tell: most of the picture white (image_saturated) or hardly a pixel above black
 // (image_dark). `name` is the camera's.
-Verdict check_image(const ImageView& image, const std::string& name);
+Verdict check_image(const PictureHealth& health, const std::string& name);
 
 // M6.2: marks in all, in each camera of the job, cameras. `used` are the views that count; those of weight 0
 // do not. The reason lists the views that are missing.

@@ -141,12 +141,12 @@ struct Picture {
 };
 
 TEST(ImageCheck, NamesBlackAndWhitePictures) {
-  EXPECT_EQ(check_image(Picture(100).view, "camera1").code, Code::ok);
-  const Verdict dark = check_image(Picture(3).view, "camera1");
+  EXPECT_EQ(check_image(picture_health(Picture(100).view), "camera1").code, Code::ok);
+  const Verdict dark = check_image(picture_health(Picture(3).view), "camera1");
   EXPECT_EQ(dark.code, Code::image_dark);
   EXPECT_NE(dark.reason.find("camera1"), std::string::npos);
-  EXPECT_EQ(check_image(Picture(255).view, "camera1").code, Code::image_saturated);
-  EXPECT_EQ(check_image({}, "camera1").code, Code::image_dark);
+  EXPECT_EQ(check_image(picture_health(Picture(255).view), "camera1").code, Code::image_saturated);
+  EXPECT_EQ(check_image(picture_health({}), "camera1").code, Code::image_dark);
 }
 
 Zero some_zero() {
