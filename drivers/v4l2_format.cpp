@@ -249,6 +249,17 @@ void set_position(const V4l2Handle& handle, const CameraOptions& options) {
   (void)set_crop(handle, crop);
 }
 
+// The picture fills the buffer, whatever part of it another program had chosen. Devices without a choice fill
+// it.
+void fill_buffer(const V4l2Handle& handle) {
+  v4l2_selection part{};
+  part.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  part.target = V4L2_SEL_TGT_COMPOSE_DEFAULT;
+  if (handle.call(VIDIOC_G_SELECTION, &part) != 0) return;
+  part.target = V4L2_SEL_TGT_COMPOSE;
+  (void)handle.call(VIDIOC_S_SELECTION, &part);
+}
+
 std::chrono::nanoseconds set_rate(const V4l2Handle& handle, const CameraOptions& options,
                                   bool several_planes) {
   v4l2_streamparm parameters{};
@@ -305,6 +316,7 @@ V4l2Layout configure_v4l2(const V4l2Handle& handle, const CameraOptions& options
   adopt_timings(handle);
   set_format(handle, options, several_planes, layout);
   set_position(handle, options);
+  fill_buffer(handle);
   set_format(handle, options, several_planes, layout);  // a new position may have changed it
   layout.period = set_rate(handle, options, several_planes);
   return layout;

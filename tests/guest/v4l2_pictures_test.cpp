@@ -59,7 +59,9 @@ INSTANTIATE_TEST_SUITE_P(Formats, VividPixels,
                                          Looped{PixelFormat::mono16, "Y16 ", 65535, 1280, 1024},
                                          Looped{PixelFormat::yuyv, "YUYV", 255, 768, 572}));
 
-// Every row of a field of alternating lines is the same grey; the two fields are black and white.
+// Every row of a field of alternating lines is the same grey; the two fields are black and white. The first
+// line of a 625-line picture, the top field's, carries data beside the picture (WSS), which vivid draws as
+// noise.
 class VividFields : public Vivid, public testing::WithParamInterface<std::string> {
  protected:
   void TearDown() override { set_control(0, "test_pattern", 0); }
@@ -68,12 +70,12 @@ class VividFields : public Vivid, public testing::WithParamInterface<std::string
     CameraOptions options = options_of(0, 720, height_px);
     options.v4l2.input = 1;
     options.v4l2.fields = fields;
-    options.v4l2.controls = {{"Test Pattern", 15}, {"osd_text_mode", 2}};
+    options.v4l2.controls = {{"Loop Video", 0}, {"Test Pattern", 15}, {"osd_text_mode", 2}};
     V4l2Camera camera(options);
     camera.start();
     const Frame frame = grab(camera);
     std::vector<int> greys;
-    for (int v = 0; v < frame.height_px; ++v) {
+    for (int v = 1; v < frame.height_px; ++v) {
       EXPECT_TRUE(std::ranges::all_of(frame.row(v), [&](auto grey) { return grey == frame.row(v)[0]; }));
       greys.push_back(frame.row(v)[0]);
     }
@@ -85,13 +87,14 @@ TEST_P(VividFields, AreTakenApart) {
   output_of("v4l2-ctl -d " + capture_device(0) + " --set-input 1 --set-standard pal");
   output_of("v4l2-ctl -d " + capture_device(0) + " --set-fmt-video width=720,height=576,field=" + GetParam());
   const auto top = rows(Fields::top, 288), bottom = rows(Fields::bottom, 288);
-  ASSERT_EQ(top.size(), 288U);
+  ASSERT_EQ(top.size(), 287U);
   EXPECT_GT(std::abs(top[0] - bottom[0]), 200);
-  EXPECT_EQ(std::ranges::count(top, top[0]), 288);
-  EXPECT_EQ(std::ranges::count(bottom, bottom[0]), 288);
+  EXPECT_EQ(std::ranges::count(top, top[0]), 287);
+  EXPECT_EQ(std::ranges::count(bottom, bottom[0]), 287);
   if (GetParam() != "interlaced") return;
   const auto both = rows(Fields::both, 576);
-  for (std::size_t v = 0; v < 576; ++v) EXPECT_EQ(both[v], v % 2 == 0 ? top[0] : bottom[0]) << v;
+  ASSERT_EQ(both.size(), 575U);
+  for (std::size_t i = 0; i < 575; ++i) EXPECT_EQ(both[i], i % 2 == 0 ? bottom[0] : top[0]) << i;
 }
 
 INSTANTIATE_TEST_SUITE_P(Orders, VividFields,
