@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <optional>
 #include <stdexcept>
 
@@ -58,7 +59,38 @@ v4l2_buffer output_buffer(std::size_t index) {
   return buffer;
 }
 
+struct Identity {
+  std::string bus;
+  bool output = false;
+};
+
+Identity identify(const std::string& device) {
+  Identity identity;
+  const int fd = ::open(device.c_str(), O_RDWR | O_CLOEXEC);
+  if (fd < 0) return identity;
+  v4l2_capability capability{};
+  if (::ioctl(fd, VIDIOC_QUERYCAP, &capability) == 0) {
+    const auto* bus = &capability.bus_info[0];
+    identity.bus.assign(bus, std::find(bus, bus + sizeof capability.bus_info, 0));
+    identity.output = (capability.device_caps & V4L2_CAP_VIDEO_OUTPUT) != 0;
+  }
+  ::close(fd);
+  return identity;
+}
+
 }  // namespace
+
+std::string output_beside(const std::string& capture) {
+  const std::string bus = identify(capture).bus;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev")) {
+    if (bus.empty() || !entry.path().filename().string().starts_with("video")) continue;
+    const Identity other = identify(entry.path().string());
+    if (other.output && other.bus == bus) return entry.path().string();
+  }
+  throw std::runtime_error("camera " + capture +
+                           " has no output device beside it; load the kernel's module "
+                           "vivid with an output for each capture device");
+}
 
 V4l2Output::V4l2Output(const ShownPicture& picture) : device_(picture.output) {
   fd_ = ::open(device_.c_str(), O_RDWR | O_CLOEXEC);

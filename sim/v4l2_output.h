@@ -16,6 +16,9 @@ struct ShownPicture {
   int pixel_bytes = 1;
 };
 
+// The output device on the same bus as a capture device. Throws std::runtime_error: there is none.
+std::string output_beside(const std::string& capture);
+
 class V4l2Output {
  public:
   // Sets both ends to the smallest digital signal that holds the picture, then shows black. The capture end
