@@ -56,6 +56,7 @@ void V4l2Camera::trigger() {
     device_.buffers().start();
     first_ = true;
   }
+  last_number_.reset();
   outstanding_ = true;
 }
 
@@ -80,7 +81,6 @@ void V4l2Camera::count_gap(const FilledBuffer& buffer) {
 }
 
 std::optional<FilledBuffer> V4l2Camera::next_answer(TimePoint deadline) {
-  last_number_.reset();
   while (auto buffer = device_.next(deadline)) {
     const V4l2Field wanted = device_.layout().field;
     const bool other_field = wanted != V4l2Field::whole && buffer->field != wanted;

@@ -43,7 +43,7 @@ class V4l2Camera final : public Camera {
   TimePoint triggered_{};
   bool outstanding_ = false;                  // a trigger was sent and nothing came
   bool first_ = false;                        // nothing came since the stream started
-  std::optional<std::uint64_t> last_number_;  // the driver's, of this grab
+  std::optional<std::uint64_t> last_number_;  // the driver's, since the trigger
   std::uint64_t sequence_ = 0;
 };
 

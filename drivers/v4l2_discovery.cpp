@@ -25,7 +25,7 @@ std::string link_to(const fs::path& device, const char* folder) {
   std::error_code none;
   for (fs::directory_iterator entry(folder, none), end; !none && entry != end; entry.increment(none)) {
     std::error_code dead;
-    if (fs::equivalent(entry->path(), device, dead) && !dead) return entry->path().string();
+    if (fs::canonical(entry->path(), dead) == device) return entry->path().string();
   }
   return {};
 }

@@ -215,25 +215,49 @@ void set_format(const V4l2Handle& handle, const CameraOptions& options, bool sev
   layout.least_bytes = static_cast<std::size_t>(got.stride) * (got.height - 1) + got.width * pixel_bytes;
 }
 
-// Where the picture begins on the sensor. Devices without a crop begin at 0, 0.
+bool set_crop(const V4l2Handle& handle, v4l2_selection& crop) {
+  const int error = handle.call(VIDIOC_S_SELECTION, &crop);
+  if (error == EBUSY || error == ENODEV) handle.require(error, "setting where the picture begins");
+  return error == 0;
+}
+
+// Where the picture begins on the sensor, one pixel of it for one that is handed out. Only where the picture
+// is larger than the signal, and begins at 0, 0, the whole signal is scaled to it by the device.
 void set_position(const V4l2Handle& handle, const CameraOptions& options) {
   const bool moved = options.x_px != 0 || options.y_px != 0;
   v4l2_selection crop{};
   crop.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  crop.target = V4L2_SEL_TGT_CROP;
+  crop.target = V4L2_SEL_TGT_CROP_DEFAULT;
   if (handle.call(VIDIOC_G_SELECTION, &crop) != 0) {
     if (moved) handle.fail("cannot choose where its picture begins; remove x_px and y_px from the cell file");
     return;
   }
+  const v4l2_rect whole = crop.r;
   const int lines = options.v4l2.fields == Fields::both ? 1 : 2;
+  crop.target = V4L2_SEL_TGT_CROP;
   crop.r = {options.x_px, options.y_px, static_cast<std::uint32_t>(options.width_px),
             static_cast<std::uint32_t>(options.height_px * lines)};
-  const int error = handle.call(VIDIOC_S_SELECTION, &crop);
-  if (error == EBUSY || error == ENODEV) handle.require(error, "setting where the picture begins");
-  if ((error != 0 && moved) || (error == 0 && (crop.r.left != options.x_px || crop.r.top != options.y_px)))
+  const v4l2_rect wanted = crop.r;
+  const bool set = set_crop(handle, crop) && crop.r.left == wanted.left && crop.r.top == wanted.top &&
+                   crop.r.width == wanted.width && crop.r.height == wanted.height;
+  if (set) return;
+  if (moved)
     handle.fail("cannot begin its picture at " + std::to_string(options.x_px) + "," +
                     std::to_string(options.y_px) + "; correct x_px and y_px in the cell file",
                 DeviceFault::wrong_size);
+  crop.r = whole;
+  (void)set_crop(handle, crop);
+}
+
+// The picture fills the buffer, whatever part of it another program had chosen. Devices without a choice fill
+// it.
+void fill_buffer(const V4l2Handle& handle) {
+  v4l2_selection part{};
+  part.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  part.target = V4L2_SEL_TGT_COMPOSE_DEFAULT;
+  if (handle.call(VIDIOC_G_SELECTION, &part) != 0) return;
+  part.target = V4L2_SEL_TGT_COMPOSE;
+  (void)handle.call(VIDIOC_S_SELECTION, &part);
 }
 
 std::chrono::nanoseconds set_rate(const V4l2Handle& handle, const CameraOptions& options,
@@ -292,6 +316,7 @@ V4l2Layout configure_v4l2(const V4l2Handle& handle, const CameraOptions& options
   adopt_timings(handle);
   set_format(handle, options, several_planes, layout);
   set_position(handle, options);
+  fill_buffer(handle);
   set_format(handle, options, several_planes, layout);  // a new position may have changed it
   layout.period = set_rate(handle, options, several_planes);
   return layout;

@@ -15,6 +15,13 @@ std::vector<ServedCamera> served(const std::vector<CameraOptions>& cameras) {
   return all;
 }
 
+std::vector<V4l2Server::Served> served_by_v4l2(const std::vector<CameraOptions>& cameras) {
+  std::vector<V4l2Server::Served> all;
+  for (const CameraOptions& camera : cameras)
+    all.push_back({camera.v4l2.device, camera.width_px, camera.height_px});
+  return all;
+}
+
 }  // namespace
 
 CellPictures::CellPictures(const Scene& scene)
@@ -46,16 +53,30 @@ void CellPictures::draw(std::size_t camera, std::span<std::uint8_t> pixels) {
 }
 
 SimulatedCell::SimulatedCell(const Cell& cell, Scene scene)
-    : scene_(std::move(scene)),
-      X_WO_(scene_.X_WO_nominal),
-      pictures_(scene_),
-      server_(served(cell.cameras), [this](std::size_t camera, std::span<std::uint8_t> pixels) {
-        pictures_.draw(camera, pixels);
-      }) {}
+    : scene_(std::move(scene)), X_WO_(scene_.X_WO_nominal), pictures_(scene_) {
+  const auto draw = [this](std::size_t camera, std::span<std::uint8_t> pixels) {
+    pictures_.draw(camera, pixels);
+  };
+  const auto driven_by = [&](CameraDriver driver) {
+    return std::ranges::all_of(cell.cameras, [&](const auto& camera) { return camera.driver == driver; });
+  };
+  if (driven_by(CameraDriver::gige))
+    gige_ = std::make_unique<GigeServer>(served(cell.cameras), draw);
+  else if (driven_by(CameraDriver::v4l2))
+    v4l2_ = std::make_unique<V4l2Server>(served_by_v4l2(cell.cameras), draw);
+  else
+    throw std::runtime_error("the simulated cell serves cameras that are all of driver gige or all of v4l2");
+}
+
+GigeServer& SimulatedCell::gige(const char* fault) {
+  if (!gige_) throw std::invalid_argument(std::string(fault) + " is for GigE Vision cameras only");
+  return *gige_;
+}
 
 void SimulatedCell::render() {
   pictures_.show(X_WO_, faults_);
-  server_.picture_changed();
+  if (gige_) gige_->picture_changed();
+  if (v4l2_) v4l2_->picture_changed();
 }
 
 void SimulatedCell::show(const Pose& X_WO) {
@@ -86,7 +107,10 @@ std::size_t SimulatedCell::index_of(const std::string& camera) const {
   return static_cast<std::size_t>(found - scene_.cameras.begin());
 }
 
-bool SimulatedCell::camera_runs(const std::string& camera) const { return server_.running(index_of(camera)); }
+bool SimulatedCell::camera_runs(const std::string& camera) const {
+  const std::size_t index = index_of(camera);
+  return !gige_ || gige_->running(index);
+}
 
 void SimulatedCell::cover_mark(const std::string& mark) {
   require_mark(mark);
@@ -109,19 +133,23 @@ void SimulatedCell::move_camera(const std::string& camera, const Pose& X_CoCn) {
   render();
 }
 
-void SimulatedCell::stop_camera(const std::string& camera) { server_.stop_camera(index_of(camera)); }
+void SimulatedCell::stop_camera(const std::string& camera) {
+  gige("stopping a camera").stop_camera(index_of(camera));
+}
 
-void SimulatedCell::start_camera(const std::string& camera) { server_.start_camera(index_of(camera)); }
+void SimulatedCell::start_camera(const std::string& camera) {
+  gige("starting a camera").start_camera(index_of(camera));
+}
 
 void SimulatedCell::lose_packets(const std::string& camera, double ratio) {
   if (!(ratio >= 0 && ratio <= 1)) throw std::invalid_argument("ratio must lie in 0..1");
-  server_.lose_packets(index_of(camera), ratio);
+  gige("losing packets").lose_packets(index_of(camera), ratio);
 }
 
 void SimulatedCell::clear_faults() {
-  for (std::size_t i = 0; i < scene_.cameras.size(); ++i) {
-    server_.start_camera(i);
-    server_.lose_packets(i, 0);
+  for (std::size_t i = 0; gige_ && i < scene_.cameras.size(); ++i) {
+    gige_->start_camera(i);
+    gige_->lose_packets(i, 0);
   }
   const std::lock_guard lock(mutex_);
   faults_ = {};

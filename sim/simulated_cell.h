@@ -12,6 +12,7 @@
 #include "sim/gige_server.h"
 #include "sim/renderer.h"
 #include "sim/scene.h"
+#include "sim/v4l2_server.h"
 
 namespace zeropose {
 
@@ -37,7 +38,8 @@ class CellPictures {
 // Calls may come from several threads and throw std::invalid_argument for names that the cell does not know.
 class SimulatedCell {
  public:
-  // Shows the object at its nominal pose. Throws std::runtime_error when a camera cannot be served.
+  // Shows the object at its nominal pose. The cameras are served by GigE Vision, or by V4L2 when those of the
+  // cell file are. Throws std::runtime_error when a camera cannot be served.
   SimulatedCell(const Cell& cell, Scene scene);
 
   // X_WO. Frames exposed after the return show the object there; the same for all faults.
@@ -56,6 +58,7 @@ class SimulatedCell {
   void clear_faults();                                         // also brings the cameras back
 
  private:
+  GigeServer& gige(const char* fault);  // throws std::invalid_argument: V4L2 cameras have no such fault
   void require_mark(const std::string& mark) const;
   std::size_t index_of(const std::string& camera) const;
   void render();  // with mutex_ held
@@ -65,7 +68,8 @@ class SimulatedCell {
   Pose X_WO_;
   Faults faults_;
   CellPictures pictures_;
-  GigeServer server_;
+  std::unique_ptr<GigeServer> gige_;  // one of the two
+  std::unique_ptr<V4l2Server> v4l2_;
 };
 
 }  // namespace zeropose
