@@ -24,5 +24,4 @@ function(zeropose_precompile target group)
 endfunction()
 
 zeropose_precompiled(pure LINK Eigen3::Eigen HEADERS <Eigen/Geometry>)
-set_property(TARGET zeropose_precompiled_pure PROPERTY ZEROPOSE_PURE ON)
 zeropose_precompiled(json LINK Eigen3::Eigen nlohmann_json::nlohmann_json HEADERS <Eigen/Geometry> <nlohmann/json.hpp>)
