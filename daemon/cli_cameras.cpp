@@ -9,6 +9,8 @@
 #include "config/cell.h"
 #include "config/text.h"
 #include "daemon/cli_answer.h"
+#include "daemon/cli_camera_choice.h"
+#include "daemon/cli_cameras_run.h"
 #include "daemon/cycle.h"
 #include "drivers/gige_discovery.h"
 #include "drivers/picture_file.h"
@@ -23,10 +25,14 @@ using std::chrono::steady_clock;
 
 constexpr auto open_patience = 15s;  // a device that another program held is free after 3 s
 
-struct Options {
-  std::string cell, camera, address, device, folder, interface, out;
-  std::vector<int> size;
+struct ListOptions {
+  std::string cell, interface;
   double seconds = 1;
+  bool json = false;
+};
+
+struct SnapshotOptions : CameraChoice {
+  std::string out;
   bool json = false;
 };
 
@@ -36,7 +42,8 @@ computer. Each with the text that a cell file needs, to which width_px and heigh
 Examples:
   zeropose cameras list
   zeropose cameras list --interface eth1 --json
-Exit status: 0 done, also when nothing was found, 2 wrong usage or an unknown interface.)";
+  zeropose cameras list --cell cell.json
+Exit status: 0 done, also when nothing was found; 1 a camera of the cell is not there; 2 wrong usage or an unknown interface.)";
 
 constexpr const char* snapshot_help =
     R"(Opens the camera itself. While a daemon runs, the camera is the daemon's: use zeropose snapshot instead.
@@ -66,11 +73,49 @@ Json v4l2_json(const FoundV4l2Camera& camera) {
           {"by_id", camera.by_id}, {"cell", {{"driver", "v4l2"}, {"device", stable}}}};
 }
 
-Answer list(const Options& options) {
+bool is_among(const CameraOptions& camera, const std::vector<FoundGigeCamera>& found) {
+  const auto agrees = [](const std::string& wanted, const std::string& has) {
+    return wanted.empty() || wanted == has;
+  };
+  return std::ranges::any_of(found, [&](const FoundGigeCamera& one) {
+    return agrees(camera.gige.address, one.address) && agrees(camera.gige.serial, one.serial) &&
+           agrees(camera.gige.user_name, one.user_name);
+  });
+}
+
+bool is_there(const CameraOptions& camera, const std::vector<FoundGigeCamera>& found) {
+  switch (camera.driver) {
+    case CameraDriver::gige:
+      return is_among(camera, found);
+    case CameraDriver::v4l2:
+      return std::filesystem::exists(camera.v4l2.device);
+    case CameraDriver::folder:
+      return std::filesystem::is_directory(camera.folder.path);
+  }
+  return false;
+}
+
+// Adds which cameras of the cell are there; false: some are not.
+bool compare_with_cell(const std::string& cell, const std::vector<FoundGigeCamera>& found, Answer& answer) {
+  bool all = true;
+  answer.json["cell"] = Json::array();
+  for (const CameraOptions& camera : load_cell(cell).cameras) {
+    const bool there = is_there(camera, found);
+    all = all && there;
+    answer.json["cell"].push_back({{"camera", camera.name}, {"place", place_of(camera)}, {"found", there}});
+    answer.text += concat({title_of(camera), there ? " is there\n" : " was NOT found\n"});
+    if (!there)
+      answer.json["reason"] = title_of(camera) + " was not found; check its power, cable and address";
+  }
+  return all;
+}
+
+Answer list(const ListOptions& options) {
   Json cameras = Json::array();
   std::string text;
   const auto wait = std::chrono::milliseconds(static_cast<long>(1000 * options.seconds));
-  for (const FoundGigeCamera& camera : discover_gige(wait, options.interface)) {
+  const std::vector<FoundGigeCamera> found = discover_gige(wait, options.interface);
+  for (const FoundGigeCamera& camera : found) {
     const Json& json = cameras.emplace_back(gige_json(camera));
     text += concat({camera.address, "  ", camera.vendor, " ", camera.model, ", serial ", camera.serial, ", ",
                     camera.interface, "\n  ", json["cell"].dump(), "\n"});
@@ -80,54 +125,11 @@ Answer list(const Options& options) {
     text += concat({camera.device, "  ", camera.card, ", ", camera.bus, "\n  ", json["cell"].dump(), "\n"});
   }
   if (cameras.empty()) text = "no camera was found; check power, cables and the interface's address\n";
-  return {done, {{"status", "ok"}, {"reason", ""}, {"cameras", cameras}}, text};
-}
-
-CameraOptions of_cell(const Options& options) {
-  const Cell cell = load_cell(options.cell);
-  const auto camera = std::ranges::find(cell.cameras, options.camera, &CameraOptions::name);
-  if (camera == cell.cameras.end())
-    throw std::invalid_argument(
-        concat({options.cell, ": has no camera \"", options.camera, "\"; name one by --camera"}));
-  return *camera;
-}
-
-CameraOptions wanted(const Options& options) {
-  if (!options.cell.empty()) return of_cell(options);
-  CameraOptions camera;
-  camera.name = "camera";
-  if (options.size.size() != 2)
-    throw std::invalid_argument("without --cell the picture's --size WIDTHxHEIGHT is needed");
-  camera.width_px = options.size[0];
-  camera.height_px = options.size[1];
-  camera.gige.address = options.address;
-  camera.v4l2.device = options.device;
-  camera.folder.path = options.folder;
-  if (!options.device.empty()) camera.driver = CameraDriver::v4l2;
-  if (!options.folder.empty()) camera.driver = CameraDriver::folder;
-  if (place_of(camera).empty())
-    throw std::invalid_argument("which camera? Give --cell and --camera, --address, --device or --folder");
-  return camera;
-}
-
-Json health_json(const PictureHealth& health) {
-  return {{"noise_grey", health.noise_grey},
-          {"saturated_share", health.saturated_share},
-          {"dark_share", health.dark_share},
-          {"mean_grey", health.mean_grey},
-          {"focus_px", health.focus_px ? Json(*health.focus_px) : Json()}};
-}
-
-std::string health_text(const PictureHealth& health) {
-  std::ostringstream text;
-  text << std::fixed << std::setprecision(2) << "mean " << health.mean_grey << " grey, noise "
-       << health.noise_grey << ", saturated " << 100 * health.saturated_share << " %, dark "
-       << 100 * health.dark_share << " %, focus ";
-  if (health.focus_px)
-    text << *health.focus_px << " px";
-  else
-    text << "unknown: no edge in the picture";
-  return text.str();
+  Answer answer{done, {{"status", "ok"}, {"reason", ""}, {"cameras", cameras}}, text};
+  if (options.cell.empty() || compare_with_cell(options.cell, found, answer)) return answer;
+  answer.exit_status = no_answer;
+  answer.json["status"] = "failed";
+  return answer;
 }
 
 Frame one_frame(const CameraOptions& options) {
@@ -140,16 +142,8 @@ Frame one_frame(const CameraOptions& options) {
   return *std::move(frame);
 }
 
-void write_png(const std::string& path, const Frame& frame) {
-  const std::vector<std::uint8_t> png = encode_png(frame);
-  std::ofstream file(path, std::ios::binary);
-  file.write(reinterpret_cast<const char*>(png.data()), static_cast<std::streamsize>(png.size()));
-  file.close();
-  if (!file) throw std::runtime_error(concat({path, ": cannot be written"}));
-}
-
-Answer snapshot(const Options& options) {
-  const CameraOptions camera = wanted(options);
+Answer snapshot(const SnapshotOptions& options) {
+  const CameraOptions camera = chosen_camera(options);
   Frame frame;
   try {
     frame = one_frame(camera);
@@ -172,26 +166,23 @@ Answer snapshot(const Options& options) {
 }
 
 void add_list(CLI::App& cameras, int& exit_status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<ListOptions>();
   CLI::App* verb = cameras.add_subcommand("list", "The cameras that can be reached from here");
+  verb->add_option("--cell", options->cell, "also says which cameras of this cell file are there");
   verb->add_option("--interface", options->interface, "only this network interface");
   verb->add_option("--seconds", options->seconds, "to wait for answers (1)")->check(CLI::Range(0.05, 60.0));
   verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, cameras [{driver, ..., cell}]");
+                 "one JSON object on stdout: status, reason, cameras [{driver, ..., cell}], "
+                 "cell [{camera, place, found}]");
   verb->footer(list_help);
   verb->callback(
       [options, &exit_status] { exit_status = run([&] { return list(*options); }, options->json); });
 }
 
 void add_snapshot(CLI::App& cameras, int& exit_status) {
-  auto options = std::make_shared<Options>();
+  auto options = std::make_shared<SnapshotOptions>();
   CLI::App* verb = cameras.add_subcommand("snapshot", "One picture of a camera, without a daemon");
-  verb->add_option("--cell", options->cell, "the cell file, with --camera");
-  verb->add_option("--camera", options->camera, "its name in the cell");
-  verb->add_option("--address", options->address, "of a GigE Vision camera, with --size");
-  verb->add_option("--device", options->device, "of a video device, with --size");
-  verb->add_option("--folder", options->folder, "of pictures, with --size");
-  verb->add_option("--size", options->size, "WIDTHxHEIGHT of the picture, px")->delimiter('x')->expected(2);
+  add_choice(*verb, *options);
   verb->add_option("--out", options->out, "the PNG file to write")->required();
   verb->add_flag("--json", options->json,
                  "one JSON object on stdout: status, reason, file, width_px, height_px, white, health");
@@ -203,10 +194,11 @@ void add_snapshot(CLI::App& cameras, int& exit_status) {
 }  // namespace
 
 void add_cameras(CLI::App& app, int& exit_status) {
-  CLI::App* cameras = app.add_subcommand("cameras", "Cameras without a daemon: list, snapshot");
+  CLI::App* cameras = app.add_subcommand("cameras", "Cameras without a daemon: list, snapshot, stream, test");
   cameras->require_subcommand(1);
   add_list(*cameras, exit_status);
   add_snapshot(*cameras, exit_status);
+  add_cameras_run(*cameras, exit_status);
 }
 
 }  // namespace zeropose

@@ -32,9 +32,10 @@ void GigeBuffers::done() {
   const std::lock_guard lock(mutex_);
   if (stream_ == nullptr) return;  // the stream is being destroyed and frees it
   while (ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_)) {
-    const TimePoint first_packet = started_.empty() ? steady_clock::now() : started_.front();
+    const TimePoint now = steady_clock::now();
+    const TimePoint first_packet = started_.empty() ? now : started_.front();
     if (!started_.empty()) started_.pop_front();
-    full_.push_back({GigeOwner<_ArvBuffer>(buffer), first_packet});
+    full_.push_back({GigeOwner<_ArvBuffer>(buffer), first_packet, now});
   }
   for (; full_.size() > rules_.queued; full_.pop_front()) recycle(full_.front().buffer.release());
   filled_.notify_all();

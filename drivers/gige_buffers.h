@@ -39,7 +39,7 @@ class GigeBuffers : public std::enable_shared_from_this<GigeBuffers> {
 
   struct Full {
     GigeOwner<_ArvBuffer> buffer;
-    TimePoint first_packet;
+    TimePoint first_packet, last_packet;
   };
   std::optional<Full> wait_for_full(TimePoint until);
   void give_back(GigeOwner<_ArvBuffer> buffer);

@@ -176,7 +176,6 @@ std::optional<Frame> GigeCamera::grab(TimePoint deadline) {
   if (!outstanding_) throw std::logic_error("grab() without trigger()");
   if (!triggered_by_us()) return grab_running(deadline);
   std::optional<ReceivedFrame> received = device_.receive(deadline);
-  const TimePoint now = steady_clock::now();
   if (!received) {
     require_heartbeat();
     ++statistics_.timeouts;
@@ -185,7 +184,7 @@ std::optional<Frame> GigeCamera::grab(TimePoint deadline) {
   outstanding_ = false;
   require_whole(*received);
   require_in_sequence(*received);
-  return hand_out(std::move(*received), now);
+  return hand_out(std::move(*received));
 }
 
 // A damaged frame of a camera that runs freely is followed by another one soon.
@@ -212,16 +211,15 @@ std::optional<ReceivedFrame> GigeCamera::receive_begun_after(TimePoint request, 
 std::optional<Frame> GigeCamera::grab_running(TimePoint deadline) {
   outstanding_ = false;
   std::optional<ReceivedFrame> received = receive_begun_after(triggered_, deadline);
-  const TimePoint now = steady_clock::now();
   if (!received) {
     ++statistics_.timeouts;
     return std::nullopt;
   }
   last_id_ = received->id;
-  return hand_out(std::move(*received), now);
+  return hand_out(std::move(*received));
 }
 
-Frame GigeCamera::hand_out(ReceivedFrame received, TimePoint now) {
+Frame GigeCamera::hand_out(ReceivedFrame received) {
   require_size(received);
   require_exposure(received);
   ++statistics_.frames;
@@ -232,7 +230,7 @@ Frame GigeCamera::hand_out(ReceivedFrame received, TimePoint now) {
   frame.device_time_ns = received.device_time_ns;
   frame.network_time = statistics_.ptp_state == "Slave" || statistics_.ptp_state == "Master";
   frame.triggered = triggered_;
-  frame.received = now;
+  frame.received = received.last_packet;
   frame.width_px = options_.width_px;
   frame.height_px = options_.height_px;
   frame.white = format.white;

@@ -45,7 +45,7 @@ class GigeCamera final : public Camera {
   bool triggered_by_us() const { return options_.trigger == TriggerSource::software; }
   std::optional<ReceivedFrame> receive_begun_after(TimePoint request, TimePoint deadline);
   std::optional<Frame> grab_running(TimePoint deadline);
-  Frame hand_out(ReceivedFrame received, TimePoint now);
+  Frame hand_out(ReceivedFrame received);
   void look_at_health();
   void require_size(const ReceivedFrame& frame);
   [[noreturn]] void fail_damaged(const std::string& problem) const;

@@ -190,6 +190,7 @@ ReceivedFrame GigeDevice::Handles::frame_of(GigeBuffers::Full full) {
   frame.problem = problem_of(buffer);
   frame.id = arv_buffer_get_frame_id(buffer);
   frame.first_packet = full.first_packet;
+  frame.last_packet = full.last_packet;
   const auto* data = static_cast<const std::uint8_t*>(arv_buffer_get_data(buffer, &frame.bytes));
   if (frame.problem.empty()) {
     frame.device_time_ns = arv_buffer_get_timestamp(buffer);

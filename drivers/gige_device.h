@@ -14,7 +14,7 @@ struct ReceivedFrame {
   std::string problem;   // empty: the frame is whole
   std::uint64_t id = 0;  // as the camera counts: 16 bit, without zero, or 64 bit
   std::uint64_t device_time_ns = 0;
-  TimePoint first_packet;  // host, monotonic: when it was seen
+  TimePoint first_packet, last_packet;  // host, monotonic: when they were seen
   int width_px = 0, height_px = 0;
   std::uint32_t pixel_format = 0;                // PFNC
   std::size_t bytes = 0;                         // that came
