@@ -67,13 +67,14 @@ void GigeCamera::prove_trigger() {
   for (int attempt = 0; attempt < trials; ++attempt) {
     device_.trigger();
     const auto frame = device_.receive(steady_clock::now() + trial_time);
-    if (!frame) break;
+    if (!frame) fail_silent();
     last_id_ = frame->id;
     problem = frame->problem;
     if (problem.empty() && device_.idle()) return;
   }
-  if (problem.empty()) fail_silent();
   device_.close_stream();
+  if (problem.empty())
+    fail("sends frames that nobody asked for; find out what changed its trigger", DeviceFault::missing);
   ++statistics_.damaged;
   fail_damaged(problem);
 }
