@@ -90,8 +90,7 @@ void check_keys(JsonObject& object, const CameraOptions& camera) {
                          concat({"no such key with driver ", name(camera.driver)}));
   if (camera.driver == CameraDriver::gige && !object.has("address") && !object.has("serial") &&
       !object.has("user_name"))
-    object.add_mistake("address", "nothing",
-                       "an IPv4 address such as 192.168.10.11, or serial or user_name");
+    object.add_mistake("address", "nothing", "an IPv4 address such as 192.168.10.11, or serial or user_name");
   if (camera.driver == CameraDriver::v4l2 && !object.has("device"))
     object.add_mistake("device", "nothing", "a device file such as /dev/v4l/by-path/...");
   if (camera.driver == CameraDriver::folder && !object.has("path"))

@@ -289,8 +289,8 @@ TEST(Daemon, WrongConfigEndsWithStatus2) {
 }
 
 TEST(Daemon, StatusWithoutADaemonSaysSo) {
-  const Finished finished = run_program(
-      {program_path("zeropose"), "status", "--socket", "/tmp/no-such-folder/x.sock"});
+  const Finished finished =
+      run_program({program_path("zeropose"), "status", "--socket", "/tmp/no-such-folder/x.sock"});
   EXPECT_EQ(finished.status, 2);
   EXPECT_THAT(finished.err, HasSubstr("is the program running?"));
 }
