@@ -47,7 +47,7 @@ bool run_round(Grabber& grabber, const CameraTrialOptions& options, CameraTrial&
   std::iota(all.begin(), all.end(), std::size_t{0});
   const TimePoint requested = steady_clock::now();
   const auto results = grabber.grab(all, requested + options.deadline);
-  std::vector<TimePoint> triggered;
+  std::vector<Frame> frames;
   for (std::size_t i = 0; i < results.size(); ++i) {
     CameraTrial::Camera& camera = trial.cameras[i];
     ++camera.asked;
@@ -63,12 +63,11 @@ bool run_round(Grabber& grabber, const CameraTrialOptions& options, CameraTrial&
     ++camera.answered;
     camera.latency_ms.push_back(milliseconds(frame.received - requested));
     camera.health.push_back(picture_health(view_of(frame)));
-    triggered.push_back(frame.triggered);
+    frames.push_back(frame);
     if (on_frame) go_on = on_frame(frame, camera.latency_ms.back(), camera.health.back()) && go_on;
   }
-  if (triggered.size() < results.size() || triggered.size() < 2) return go_on;
-  const auto [first, last] = std::ranges::minmax(triggered);
-  trial.spread_ms.push_back(milliseconds(last - first));
+  if (frames.size() == results.size() && frames.size() > 1)
+    trial.spread_ms.push_back(milliseconds(trigger_spread(frames)));
   return go_on;
 }
 

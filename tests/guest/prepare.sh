@@ -8,7 +8,7 @@ skip() { echo "skipped: $*"; exit 77; }
 for tool in qemu-system-x86_64 busybox cpio depmod xz dpkg-deb apt-get apt-cache; do
   PATH=$PATH:/usr/sbin:/sbin command -v "$tool" >/dev/null || skip "$tool is missing; see .ci/install-packages"
 done
-[ -f "$folder/initrd" ] && [ -f "$folder/vmlinuz" ] && exit 0
+[ "$folder/initrd" -nt "$(dirname "$0")/init" ] && [ -f "$folder/vmlinuz" ] && exit 0
 
 mkdir -p "$folder"
 making=$folder/making.$$
