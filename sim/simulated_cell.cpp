@@ -43,19 +43,20 @@ void CellPictures::show(const Pose& X_WO, const Faults& faults) {
   clean_ = std::move(fresh);
 }
 
-void CellPictures::draw(std::size_t camera, std::span<std::uint8_t> pixels) {
+void CellPictures::draw(std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first) {
   std::shared_ptr<const Clean> clean;
   {
     const std::lock_guard lock(mutex_);
     clean = clean_[camera];
   }
-  add_noise(*clean, noise_sigma_grey_, noise_states_[camera], pixels);
+  add_noise(std::span(*clean).subspan(first, pixels.size()), noise_sigma_grey_, noise_states_[camera],
+            pixels);
 }
 
 SimulatedCell::SimulatedCell(const Cell& cell, Scene scene)
     : scene_(std::move(scene)), X_WO_(scene_.X_WO_nominal), pictures_(scene_) {
-  const auto draw = [this](std::size_t camera, std::span<std::uint8_t> pixels) {
-    pictures_.draw(camera, pixels);
+  const auto draw = [this](std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first = 0) {
+    pictures_.draw(camera, pixels, first);
   };
   const auto driven_by = [&](CameraDriver driver) {
     return std::ranges::all_of(cell.cameras, [&](const auto& camera) { return camera.driver == driver; });

@@ -22,8 +22,9 @@ class CellPictures {
   explicit CellPictures(const Scene& scene);  // shows the object at its nominal pose
 
   void show(const Pose& X_WO, const Faults& faults);  // renders all cameras side by side
-  // The frame that a camera takes now; the noise of every call is new. One thread for each camera at a time.
-  void draw(std::size_t camera, std::span<std::uint8_t> pixels);
+  // The frame that a camera takes now, from pixel `first` on; the noise of every call is new. One thread for
+  // each camera at a time.
+  void draw(std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first = 0);
 
  private:
   using Clean = std::vector<float>;

@@ -8,7 +8,10 @@
 namespace zeropose {
 namespace {
 
-constexpr std::chrono::milliseconds noise_period{150};  // a picture is drawn anew after it
+// The noise comes anew strip by strip, not picture by picture: where the machine is slow, two frames may
+// follow each other before a whole picture is drawn, and must not be the same.
+constexpr std::chrono::milliseconds strip_period{10};
+constexpr std::size_t strips = 16;
 
 }  // namespace
 
@@ -42,18 +45,21 @@ V4l2Server::~V4l2Server() {
 void V4l2Server::keep_showing(Slot& slot, const std::stop_token& stop) {
   std::vector<std::uint8_t> fresh(slot.output->shown().size());
   std::uint64_t last = 0;
+  std::size_t strip = 0;
   while (!stop.stop_requested()) {
     std::uint64_t generation = 0;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait_for(lock, stop, noise_period, [&] { return generation_ != last; });
+      changed_.wait_for(lock, stop, strip_period, [&] { return generation_ != last; });
       generation = generation_;
     }
-    draw_(slot.index, fresh);
     std::string problem;
     if (generation == last) {
-      std::ranges::copy(fresh, slot.output->shown().begin());
+      const std::size_t begin = fresh.size() * strip / strips, end = fresh.size() * (strip + 1) / strips;
+      draw_(slot.index, slot.output->shown().subspan(begin, end - begin), begin);
+      strip = (strip + 1) % strips;
     } else {
+      draw_(slot.index, fresh, 0);
       try {
         slot.output->show(fresh);
       } catch (const std::runtime_error& error) {

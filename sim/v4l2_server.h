@@ -17,8 +17,9 @@ namespace zeropose {
 
 class V4l2Server {
  public:
-  // Fills width * height grey levels; from one thread for each camera, again and again.
-  using Draw = std::function<void(std::size_t camera, std::span<std::uint8_t> pixels)>;
+  // Fills the grey levels of a picture from pixel `first` on, row by row; from one thread for each camera,
+  // again and again.
+  using Draw = std::function<void(std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first)>;
 
   struct Served {
     std::string capture;  // device file; its output is that of the same bus
