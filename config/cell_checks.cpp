@@ -101,7 +101,8 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
   }
 }
 
-// Two servers cannot listen on one port; 0.0.0.0 takes the port of every address.
+// Robots of one address and port have a unit id each. Two servers cannot listen on one port; 0.0.0.0 takes
+// the port of every address.
 void check_ports(const std::vector<RobotOptions>& robots, JsonReading& reading) {
   const std::string every = "0.0.0.0";
   for (std::size_t i = 0; i < robots.size(); ++i)
@@ -110,10 +111,17 @@ void check_ports(const std::vector<RobotOptions>& robots, JsonReading& reading) 
       const bool overlap =
           robots[i].address == robots[j].address || robots[i].address == every || robots[j].address == every;
       if (!overlap || robots[i].port != robots[j].port) continue;
-      reading.add_mistake(path_of("robots", i) + ".link.port",
-                          robots[i].address + ":" + std::to_string(robots[i].port) + ", as in " +
-                              path_of("robots", j) + ".link",
-                          "a port of its own for each robot");
+      const std::string place = robots[i].address + ":" + std::to_string(robots[i].port);
+      const std::string other = ", as in " + path_of("robots", j) + ".link";
+      if (robots[i].address != robots[j].address)
+        reading.add_mistake(path_of("robots", i) + ".link.port", place + other,
+                            "a port of its own for each address");
+      else if (robots[i].unit == robots[j].unit)
+        reading.add_mistake(path_of("robots", i) + ".link.unit",
+                            place + " unit " + std::to_string(robots[i].unit) + other,
+                            "a port or a unit id of its own for each robot");
+      else
+        continue;
       break;
     }
 }

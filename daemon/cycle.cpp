@@ -265,6 +265,9 @@ Report Cycle::report_for(const Request& request) {
       if (job != cell_.jobs.end()) select(static_cast<std::size_t>(job - cell_.jobs.begin()));
       return report;
     }
+    case CommandKind::at_position:
+      report.code = Code::no_procedure;
+      return report;
     default:
       report.code = Code::unknown_command;
       return report;

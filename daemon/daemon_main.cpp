@@ -13,8 +13,8 @@
 #include "daemon/cycle.h"
 #include "daemon/notify.h"
 #include "daemon/version.h"
+#include "daemon/wires.h"
 #include "protocol/line_socket.h"
-#include "protocol/modbus_server.h"
 
 namespace zeropose {
 namespace {
@@ -47,17 +47,9 @@ bool stop_wanted(const sigset_t& signals, std::chrono::milliseconds patience) {
   return sigtimedwait(&signals, nullptr, &wait) > 0;
 }
 
-using Links = std::vector<std::unique_ptr<ModbusTcpLink>>;
-
-ModbusServerOptions link_options(const Cell& cell, std::size_t index) {
+EndpointOptions endpoint_options(const Cell& cell, std::size_t index) {
   const RobotOptions& robot = cell.robots[index];
-  ModbusServerOptions options;
-  options.address = robot.address;
-  options.port = robot.port;
-  options.unit = robot.unit;
-  options.require_command_crc = robot.require_command_crc;
-  options.allowed_writers = robot.allowed_writers;
-  options.allowed_readers = robot.allowed_readers;
+  EndpointOptions options;
   options.handshake.robot = index;
   options.handshake.robot_index = static_cast<std::uint16_t>(index + 1);
   options.handshake.convention = robot.convention;
@@ -68,39 +60,42 @@ ModbusServerOptions link_options(const Cell& cell, std::size_t index) {
   return options;
 }
 
-Links open_links(Cycle& cycle) {
-  Links links;
-  const Cell& cell = cycle.cell();
-  for (std::size_t i = 0; i < cell.robots.size(); ++i) {
-    links.push_back(std::make_unique<ModbusTcpLink>(
-        link_options(cell, i), [&cycle](const Request& request) { cycle.enqueue(request); }));
-    cycle.add_link(*links.back());
-    spdlog::info("{}: Modbus TCP on {}:{}, unit {}", cell.robots[i].name, cell.robots[i].address,
-                 links.back()->port(), cell.robots[i].unit);
-  }
-  return links;
-}
-
-// Tells progress from standstill: the cycle must have come round, and every link's loop since the last look.
-class Pulse {
+// The robots of a cell, and the wires that they hang on.
+class Links {
  public:
-  Pulse(const Cycle& cycle, const Links& links) : cycle_(cycle), links_(links), rounds_(links.size()) {}
+  explicit Links(Cycle& cycle) {
+    const Cell& cell = cycle.cell();
+    for (std::size_t i = 0; i < cell.robots.size(); ++i) {
+      endpoints_.push_back(std::make_unique<RobotEndpoint>(
+          endpoint_options(cell, i), [&cycle](const Request& request) { cycle.enqueue(request); }));
+      cycle.add_link(*endpoints_.back());
+    }
+    wires_ = open_wires(cell.robots, endpoints_);
+    rounds_.resize(wires_.size());
+  }
 
-  bool felt() {
-    bool progress = Clock::now() - cycle_.last_progress() < stalled_after + cycle_.cell().deadline;
-    for (std::size_t i = 0; i < links_.size(); ++i) {
-      const std::uint64_t rounds = links_[i]->counters().rounds;
-      progress = progress && rounds != rounds_[i];
+  // True when the loop of every wire has come round since the last look.
+  bool alive() {
+    bool all = true;
+    for (std::size_t i = 0; i < wires_.size(); ++i) {
+      const std::uint64_t rounds = wires_[i]->rounds();
+      all = all && rounds != rounds_[i];
       rounds_[i] = rounds;
     }
-    return progress;
+    return all;
   }
 
  private:
-  const Cycle& cycle_;
-  const Links& links_;
+  std::vector<std::unique_ptr<RobotEndpoint>> endpoints_;
+  std::vector<std::unique_ptr<Wire>> wires_;
   std::vector<std::uint64_t> rounds_;
 };
+
+// Tells progress from standstill.
+bool progresses(const Cycle& cycle, Links& links) {
+  const bool cycle_alive = Clock::now() - cycle.last_progress() < stalled_after + cycle.cell().deadline;
+  return links.alive() && cycle_alive;
+}
 
 // True when it was asked to stop.
 bool wait_for_cameras(const Cycle& cycle, const sigset_t& signals) {
@@ -110,12 +105,11 @@ bool wait_for_cameras(const Cycle& cycle, const sigset_t& signals) {
   return false;
 }
 
-void serve(const Cycle& cycle, const Links& links, const sigset_t& signals) {
+void serve(const Cycle& cycle, Links& links, const sigset_t& signals) {
   const auto period = std::max(watchdog_interval().value_or(1s), look_at_least_every);
-  Pulse pulse(cycle, links);
   bool alive = true;
   while (!stop_wanted(signals, period)) {
-    const bool progress = pulse.felt();
+    const bool progress = progresses(cycle, links);
     if (progress) notify_alive();
     if (alive && !progress)
       spdlog::critical("no progress in the cycle or a link: the watchdog is no longer fed");
@@ -132,7 +126,7 @@ struct StopFirst {
 void run(const Options& options) {
   const sigset_t signals = block_stop_signals();
   Cycle cycle(load_cell(options.cell), options.state);
-  const auto links = open_links(cycle);
+  Links links(cycle);
   const StopFirst stop_first{cycle};
   cycle.start();
   const LineServer control(options.socket,

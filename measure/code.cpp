@@ -24,9 +24,14 @@ constexpr std::array table{
         "If a new zero is wanted, send the guard 0x5A45524F as the argument; if not, find out who sent it."},
     CodeText{Code::halted, "halted", "An operator halted the cell.",
              "Resume it on the screen or by the command."},
-    CodeText{Code::argument_out_of_range, "argument_out_of_range",
-             "A command carried an argument outside its range.",
-             "Check the argument in the robot program, above all its unit and its sign."},
+    CodeText{
+        Code::argument_out_of_range, "argument_out_of_range",
+        "A command carried an argument outside its range.",
+        "Check the argument in the robot program, above all its unit and its sign; before AtPosition, write "
+        "the position block with the same index."},
+    CodeText{Code::no_procedure, "no_procedure",
+             "A robot told its position, but no calibration waits for it.",
+             "Start the calibration first, then the robot program that goes through the positions."},
 
     CodeText{Code::camera_missing, "camera_missing", "A camera of the job does not answer.",
              "Check its power, its network cable and the switch; the camera's name is in the reason."},

@@ -19,6 +19,7 @@ enum class Code : std::uint16_t {
   zero_guard_wrong = 104,
   halted = 105,
   argument_out_of_range = 106,
+  no_procedure = 107,
 
   camera_missing = 201,
   frame_timeout = 202,

@@ -215,4 +215,25 @@ CommandRegisters encode_command(const Command& command, std::uint16_t data_id) {
   return r;
 }
 
+std::optional<PositionBlock> decode_position(std::span<const std::uint16_t> registers, bool require_crc,
+                                             std::uint16_t data_id) {
+  if (registers.size() != position_reg::block_size) return std::nullopt;
+  const std::uint32_t crc = crc32_of_registers(data_id, registers.first(position_reg::crc));
+  if (require_crc && get32(registers, position_reg::crc) != crc) return std::nullopt;
+  PositionBlock position{get32(registers, position_reg::index), {}};
+  for (std::size_t i = 0; i < reg::value_count; ++i)
+    position.values[i] = static_cast<std::int32_t>(get32(registers, position_reg::values + 2 * i));
+  return position;
+}
+
+PositionRegisters encode_position(const PositionBlock& position, std::uint16_t data_id) {
+  PositionRegisters r{};
+  put32(r, position_reg::index, position.index);
+  for (std::size_t i = 0; i < reg::value_count; ++i)
+    put32(r, position_reg::values + 2 * i, static_cast<std::uint32_t>(position.values[i]));
+  put32(r, position_reg::crc,
+        crc32_of_registers(data_id, std::span<const std::uint16_t>(r).first(position_reg::crc)));
+  return r;
+}
+
 }  // namespace zeropose

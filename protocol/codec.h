@@ -1,4 +1,4 @@
-// The result block and the command block, between values and registers (spec 80). Pure.
+// The result, command and position blocks, between values and registers (spec 80). Pure.
 #pragma once
 
 #include <array>
@@ -99,5 +99,20 @@ struct Command {
 std::optional<Command> decode_command(std::span<const std::uint16_t> registers, bool require_crc = true,
                                       std::uint16_t data_id = default_command_data_id);
 CommandRegisters encode_command(const Command& command, std::uint16_t data_id = default_command_data_id);
+
+// Where the robot's hand is, for calibration: X_RH in its convention.
+struct PositionBlock {
+  std::uint32_t index = 0;
+  WireValues values = no_values;
+  friend bool operator==(const PositionBlock&, const PositionBlock&) = default;
+};
+using PositionRegisters = std::array<std::uint16_t, position_reg::block_size>;
+
+// nullopt: not exactly its registers, or the CRC is asked for and wrong.
+std::optional<PositionBlock> decode_position(std::span<const std::uint16_t> registers,
+                                             bool require_crc = true,
+                                             std::uint16_t data_id = default_command_data_id);
+PositionRegisters encode_position(const PositionBlock& position,
+                                  std::uint16_t data_id = default_command_data_id);
 
 }  // namespace zeropose

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
 namespace zeropose {
 namespace {
@@ -181,7 +182,7 @@ CommandOutcome Handshake::on_command(const Command& command, ConnectionId from, 
   last_id_ = command.request_id;
   owner_ = from;
   ++counters_.accepted;
-  const CommandOutcome outcome = take(command, now);
+  const CommandOutcome outcome = take(command, from, now);
   refresh();
   return outcome;
 }
@@ -196,8 +197,8 @@ CommandOutcome Handshake::acknowledge(const Command& command, ConnectionId from)
   CommandOutcome outcome{CommandVerdict::accepted, {}};
   if (error_) {
     error_ = false;
-    outcome.request =
-        Request{options_.robot, CommandKind::reset, command.request_id, 0, 0, 0, {}, {}, ++tickets_};
+    outcome.request = Request{options_.robot, CommandKind::reset, command.request_id, 0, 0, 0, {}, {},
+                              ++tickets_,     Pose::Identity()};
   }
   refresh();
   return outcome;
@@ -216,7 +217,7 @@ Code Handshake::why_not(const Command& command) const {
   return Code::ok;
 }
 
-CommandOutcome Handshake::take(const Command& command, TimePoint now) {
+CommandOutcome Handshake::take(const Command& command, ConnectionId from, TimePoint now) {
   const Code argument = command.argument == 0 ? Code::ok : Code::argument_out_of_range;
   switch (static_cast<CommandKind>(command.kind)) {
     case CommandKind::measure:
@@ -225,6 +226,8 @@ CommandOutcome Handshake::take(const Command& command, TimePoint now) {
       const Code code = why_not(command);
       return code == Code::ok ? start(command, now) : answer_at_once(command, code, now);
     }
+    case CommandKind::at_position:
+      return at_position(command, from, now);
     case CommandKind::halt:
       if (argument == Code::ok) halted_ = true;
       return answer_at_once(command, argument, now);
@@ -242,11 +245,40 @@ CommandOutcome Handshake::take(const Command& command, TimePoint now) {
   }
 }
 
+CommandVerdict Handshake::on_position(const PositionBlock& position, ConnectionId from, TimePoint now) {
+  tick(now);
+  if (execution_) return refuse(CommandVerdict::busy);
+  const auto X_RH = from_wire(options_.convention, position.values);
+  if (!X_RH) return refuse(CommandVerdict::wrong_argument);
+  position_ = Position{position.index, *X_RH, from};
+  return CommandVerdict::accepted;
+}
+
+CommandOutcome Handshake::at_position(const Command& command, ConnectionId from, TimePoint now) {
+  const auto position = std::exchange(position_, std::nullopt);
+  const bool told =
+      position && position->from == from && position->index == static_cast<std::uint32_t>(command.argument);
+  const Code code = told ? why_not(command) : Code::argument_out_of_range;
+  if (code != Code::ok) return answer_at_once(command, code, now);
+  CommandOutcome outcome = start(command, now);
+  outcome.request->X_RH = position->X_RH;
+  return outcome;
+}
+
 Request Handshake::request_of(const Command& command, TimePoint now) {
   const auto kind = static_cast<CommandKind>(command.kind);
   const auto time = kind == CommandKind::zero ? options_.zero_deadline : options_.measure_deadline;
-  return {options_.robot,   kind, command.request_id, command.job, command.part,
-          command.argument, now,  now + time,         ++tickets_};
+  Request request;
+  request.robot = options_.robot;
+  request.kind = kind;
+  request.id = command.request_id;
+  request.job = command.job;
+  request.part = command.part;
+  request.argument = command.argument;
+  request.received = now;
+  request.deadline = now + time;
+  request.ticket = ++tickets_;
+  return request;
 }
 
 CommandOutcome Handshake::start(const Command& command, TimePoint now) {

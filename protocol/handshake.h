@@ -30,7 +30,7 @@ enum class CommandVerdict {
   busy,               // exception 06
   wrong_request_id,   // 0, the last one again, or one whose late answer is still to come: exception 03
   wrong_acknowledge,  // not the last id, or not the connection that sent it: exception 03
-  wrong_argument,     // Acknowledge or Heartbeat with an argument: exception 03
+  wrong_argument,     // Acknowledge or Heartbeat with an argument, a position that is none: exception 03
   accepted
 };
 
@@ -54,6 +54,8 @@ class Handshake {
   // Withdraws a valid result when the cell is no longer ready or not the one that was measured with.
   void set_cell_state(const CellState& cell, TimePoint now);
   CommandOutcome on_command(const Command& command, ConnectionId from, TimePoint now);
+  // Kept for the AtPosition of the same connection that names its index; each counts once.
+  CommandVerdict on_position(const PositionBlock& position, ConnectionId from, TimePoint now);
   void on_exposure_done(std::uint32_t request_id, TimePoint now);
   void on_report(const Report& report, TimePoint now);
   void on_disconnect(ConnectionId connection, TimePoint now);
@@ -81,6 +83,11 @@ class Handshake {
     std::uint32_t id;
     TimePoint until;
   };
+  struct Position {
+    std::uint32_t index;
+    Pose X_RH;
+    ConnectionId from;
+  };
   struct Answer {
     std::uint32_t id = 0;
     std::uint16_t job = 0;
@@ -92,7 +99,8 @@ class Handshake {
   };
 
   CommandOutcome acknowledge(const Command& command, ConnectionId from);
-  CommandOutcome take(const Command& command, TimePoint now);
+  CommandOutcome take(const Command& command, ConnectionId from, TimePoint now);
+  CommandOutcome at_position(const Command& command, ConnectionId from, TimePoint now);
   Code why_not(const Command& command) const;
   CommandOutcome start(const Command& command, TimePoint now);
   CommandOutcome answer_at_once(const Command& command, Code code, TimePoint now);
@@ -118,6 +126,7 @@ class Handshake {
   std::optional<ConnectionId> owner_;
   std::optional<Execution> execution_;
   std::optional<Answer> answer_;
+  std::optional<Position> position_;
   std::deque<Abandoned> abandoned_;
   ResultBlock shown_;
 };

@@ -41,10 +41,18 @@ Ruling rule_read(std::size_t first, std::size_t count) {
 }
 
 Ruling rule_write(std::size_t first, std::size_t count) {
-  const std::size_t block_end = command_reg::first + command_reg::block_size;
-  if (first < command_reg::first || first + count > block_end) return exception(illegal_data_address);
-  if (count != command_reg::block_size) return exception(illegal_data_value);
-  return {Ruling::Kind::command, 0};
+  struct Block {
+    std::size_t first, size;
+    Ruling::Kind kind;
+  };
+  constexpr Block blocks[] = {{command_reg::first, command_reg::block_size, Ruling::Kind::command},
+                              {position_reg::first, position_reg::block_size, Ruling::Kind::position}};
+  for (const Block& block : blocks) {
+    if (first < block.first || first + count > block.first + block.size) continue;
+    if (count != block.size) return exception(illegal_data_value);
+    return {block.kind, 0};
+  }
+  return exception(illegal_data_address);
 }
 
 }  // namespace
@@ -74,7 +82,7 @@ std::optional<FrameProblem> FrameReader::check_header() const {
   if (buffer_.size() >= 4 && word_at(buffer_, 2) != 0) return FrameProblem::wrong_protocol;
   if (buffer_.size() >= 6 && (word_at(buffer_, 4) < 2 || word_at(buffer_, 4) > 254))
     return FrameProblem::wrong_length;
-  if (buffer_.size() >= 7 && buffer_[6] != unit_) return FrameProblem::wrong_unit;
+  if (buffer_.size() >= 7 && !units_[buffer_[6]]) return FrameProblem::wrong_unit;
   return std::nullopt;
 }
 
@@ -105,8 +113,8 @@ Ruling rule(const Adu& request, bool may_write) {
   }
 }
 
-CommandRegisters command_registers(const Adu& request) {
-  CommandRegisters registers{};
+std::vector<std::uint16_t> written_registers(const Adu& request) {
+  std::vector<std::uint16_t> registers(request.quantity());
   for (std::size_t i = 0; i < registers.size(); ++i) registers[i] = request.word(header + 6 + 2 * i);
   return registers;
 }

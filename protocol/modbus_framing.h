@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <bitset>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -25,7 +26,7 @@ inline constexpr std::size_t max_adu = 260, header = 7;
 enum class FrameProblem {
   wrong_protocol,  // MBAP protocol id is not 0
   wrong_length,    // MBAP length is not 2..254
-  wrong_unit,      // another unit id than ours
+  wrong_unit,      // a unit id that is none of ours
   wrong_pdu        // the length does not fit the function: half a request, or more than one
 };
 std::string_view name_of(FrameProblem problem);
@@ -35,6 +36,7 @@ struct Adu {
   std::array<std::uint8_t, modbus::max_adu> bytes{};
   std::size_t size = 0;
 
+  std::uint8_t unit() const { return bytes[modbus::header - 1]; }
   std::uint8_t function() const { return bytes[modbus::header]; }
   std::uint16_t address() const { return word(modbus::header + 1); }
   std::uint16_t quantity() const { return word(modbus::header + 3); }
@@ -44,10 +46,12 @@ struct Adu {
   std::span<const std::uint8_t> view() const { return std::span(bytes).first(size); }
 };
 
+using UnitSet = std::bitset<256>;  // unit ids
+
 // Cuts one connection's bytes into requests. After a problem nothing more comes out.
 class FrameReader {
  public:
-  explicit FrameReader(std::uint8_t unit) : unit_(unit) {}
+  explicit FrameReader(const UnitSet& units) : units_(units) {}
   void feed(std::span<const std::uint8_t> bytes);
   // The next whole request; nullopt: more bytes are needed, or problem().
   std::optional<Adu> next();
@@ -57,22 +61,23 @@ class FrameReader {
  private:
   std::optional<FrameProblem> check_header() const;
   std::size_t frame_size() const;  // precondition: at least six bytes
-  std::uint8_t unit_;
+  UnitSet units_;
   std::vector<std::uint8_t> buffer_;
   std::optional<FrameProblem> problem_;
 };
 
 // What to do with a request.
 struct Ruling {
-  enum class Kind { exception, read, command };
+  enum class Kind { exception, read, command, position };
   Kind kind = Kind::exception;
   std::uint8_t exception = modbus::illegal_function;
 };
 
-// Reads: of the result block, whole, or a part without its values. Writes: exactly the command block.
+// Reads: of the result block, whole, or a part without its values. Writes: exactly the command block, or
+// exactly the position block.
 Ruling rule(const Adu& request, bool may_write);
 
-// Precondition: rule() said command.
-CommandRegisters command_registers(const Adu& request);
+// Precondition: rule() said command or position.
+std::vector<std::uint16_t> written_registers(const Adu& request);
 
 }  // namespace zeropose

@@ -13,6 +13,9 @@
 namespace zeropose {
 namespace {
 
+// From the command block to the position block's end; which of them may be written is decided before.
+constexpr unsigned writable_registers = position_reg::first + position_reg::block_size - command_reg::first;
+
 struct FreeContext {
   void operator()(modbus_t* context) const { modbus_free(context); }
 };
@@ -31,9 +34,8 @@ struct ModbusReply::Library {
   // Input registers 0..60 and the same as holding registers.
   std::unique_ptr<modbus_mapping_t, FreeMapping> result{modbus_mapping_new_start_address(
       0, 0, 0, 0, 0, static_cast<unsigned>(reg::block_size), 0, static_cast<unsigned>(reg::block_size))};
-  std::unique_ptr<modbus_mapping_t, FreeMapping> command{
-      modbus_mapping_new_start_address(0, 0, 0, 0, static_cast<unsigned>(command_reg::first),
-                                       static_cast<unsigned>(command_reg::block_size), 0, 0)};
+  std::unique_ptr<modbus_mapping_t, FreeMapping> command{modbus_mapping_new_start_address(
+      0, 0, 0, 0, static_cast<unsigned>(command_reg::first), writable_registers, 0, 0)};
 };
 
 ModbusReply::ModbusReply() : library_(std::make_unique<Library>()) {

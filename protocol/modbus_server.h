@@ -1,30 +1,34 @@
-// One robot on Modbus TCP, the daemon as server (spec 80).
+// Robots on Modbus TCP, the daemon as server (spec 80): one port, and on it one unit id for each robot.
 #pragma once
 
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "protocol/handshake.h"
-#include "protocol/robot_link.h"
+#include "protocol/register_map.h"
+#include "protocol/robot_endpoint.h"
 
 namespace zeropose {
 
 struct ModbusServerOptions {
   std::string address = "127.0.0.1";  // numeric IPv4
   std::uint16_t port = 1502;          // 0: any free one, port() tells
+  std::size_t max_clients = 256;  // more than there are listed writers: each of these has a place reserved
+  std::chrono::milliseconds frame_time{1000};  // from a request's first byte to its last; to take an answer
+};
+
+// How one robot's blocks are read and written, on TCP and on a serial line.
+struct ModbusUnit {
   std::uint8_t unit = 1;
-  // The epoch is drawn at every start; what is set here is not used.
-  HandshakeOptions handshake;
   std::uint16_t result_data_id = default_result_data_id;
-  std::uint16_t command_data_id = default_command_data_id;
+  std::uint16_t command_data_id = default_command_data_id;  // also that of the position block
   bool require_command_crc = true;
+};
+
+struct ModbusTcpRobot {
+  ModbusUnit unit;
   std::vector<std::string> allowed_writers;  // numeric IPv4; empty: everybody who is not a reader
   std::vector<std::string> allowed_readers;  // may read, never write
-  std::size_t max_clients = 256;
-  std::chrono::milliseconds frame_time{1000};  // from a request's first byte to its last; to take an answer
-  // Sees every block that is published, in order. Called with the link locked: must be quick and not call it.
-  std::function<void(const ResultRegisters&)> tap;
 };
 
 struct ModbusCounters {
@@ -33,33 +37,31 @@ struct ModbusCounters {
   std::uint64_t requests = 0, reads = 0, wrong_crc = 0, writes_by_readers = 0;
   std::uint64_t wrong_protocol = 0, wrong_length = 0, wrong_unit = 0, wrong_pdu = 0;  // frames refused
   std::uint64_t exception_1 = 0, exception_2 = 0, exception_3 = 0, exception_6 = 0;
-  std::uint64_t rounds = 0;  // of the loop: grows at least twice a second while the link is alive
+  std::uint64_t rounds = 0;  // of the loop: grows at least twice a second while the server is alive
   std::size_t clients = 0;   // now
-  HandshakeCounters handshake;
 };
 
-class ModbusTcpLink : public RobotLink {
+class ModbusTcpServer : public Wire {
  public:
-  // Listens from here on. The handler is called from the link's thread, without a lock held. Throws
-  // std::invalid_argument for an option out of range and std::runtime_error when the address cannot be
-  // listened on; both say which and what to do.
-  ModbusTcpLink(const ModbusServerOptions& options, RequestHandler handler);
-  ~ModbusTcpLink() override;
-  ModbusTcpLink(const ModbusTcpLink&) = delete;
-  ModbusTcpLink& operator=(const ModbusTcpLink&) = delete;
+  struct Served {
+    ModbusTcpRobot robot;
+    RobotEndpoint& endpoint;  // must outlive the server
+  };
 
-  void set_cell_state(const CellState& state) override;
-  void exposure_done(std::uint32_t request_id) override;
-  void publish(const Report& report) override;
+  // Listens from here on. Throws std::invalid_argument for an option out of range and std::runtime_error when
+  // the address cannot be listened on; both say which and what to do.
+  ModbusTcpServer(const ModbusServerOptions& options, const std::vector<Served>& robots);
+  ~ModbusTcpServer() override;
+  ModbusTcpServer(const ModbusTcpServer&) = delete;
+  ModbusTcpServer& operator=(const ModbusTcpServer&) = delete;
 
   std::uint16_t port() const;
   ModbusCounters counters() const;
-  // What a robot would read now.
-  ResultBlock block() const;
+  std::uint64_t rounds() const override { return counters().rounds; }
 
  private:
-  class Server;
-  std::unique_ptr<Server> server_;
+  class Loop;
+  std::unique_ptr<Loop> loop_;
 };
 
 }  // namespace zeropose

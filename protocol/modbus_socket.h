@@ -30,6 +30,7 @@ class AllowList {
   // Throws std::invalid_argument naming an entry that is no numeric IPv4 address.
   AllowList(const std::vector<std::string>& writers, const std::vector<std::string>& readers);
   Role role_of(in_addr_t peer) const;
+  const std::vector<in_addr_t>& writers() const { return writers_; }
 
  private:
   std::vector<in_addr_t> writers_, readers_;

@@ -55,6 +55,17 @@ constexpr std::array<RegisterField, 6> command_fields{{
      "over the data id 0x5A51 (not on the wire) and the eight registers before"},
 }};
 
+constexpr std::size_t position_at(std::size_t offset) { return position_reg::first + offset; }
+
+constexpr std::array<RegisterField, 3> position_fields{{
+    {position_at(position_reg::index), 2, "index",
+     "of the position; the argument of AtPosition names it again"},
+    {position_at(position_reg::values), 2 * reg::value_count, "values",
+     "pose of the robot's hand in its base (X_RH), in the robot's convention; 0x80000000 where unused"},
+    {position_at(position_reg::crc), 2, "CRC-32",
+     "over the data id 0x5A51 (not on the wire) and the eighteen registers before"},
+}};
+
 std::string rows(std::span<const RegisterField> fields) {
   std::ostringstream text;
   text << "| register | field | meaning |\n|---|---|---|\n";
@@ -78,10 +89,13 @@ std::span<const RegisterField> result_block_fields() { return result_fields; }
 
 std::span<const RegisterField> command_block_fields() { return command_fields; }
 
+std::span<const RegisterField> position_block_fields() { return position_fields; }
+
 std::string register_map_markdown() {
   return "Result block: input registers (FC04), the same as holding registers (FC03).\n\n" +
          rows(result_block_fields()) + "\nCommand block: holding registers (FC16).\n\n" +
-         rows(command_block_fields());
+         rows(command_block_fields()) + "\nPosition block: holding registers (FC16).\n\n" +
+         rows(position_block_fields());
 }
 
 std::string wire_values_markdown() {

@@ -36,6 +36,7 @@ struct Request {
   TimePoint deadline;  // the answer is published then at the latest, whatever it is
   // Counts the requests of one link: a robot may use an id again, a ticket never comes back.
   std::uint64_t ticket = 0;
+  Pose X_RH = Pose::Identity();  // of AtPosition only: where the robot's hand is
 };
 
 // The cycle's answer to one request. Only code ok publishes values.

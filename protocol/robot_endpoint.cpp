@@ -1,5 +1,6 @@
 #include "protocol/robot_endpoint.h"
 
+#include <atomic>
 #include <random>
 #include <type_traits>
 #include <utility>
@@ -61,8 +62,8 @@ void RobotEndpoint::publish(const Report& report) {
 }
 
 ConnectionId RobotEndpoint::new_connection() {
-  const std::scoped_lock lock(mutex_);
-  return ++last_connection_;
+  static std::atomic<ConnectionId> last{1};
+  return ++last;
 }
 
 CommandVerdict RobotEndpoint::command(const Command& command, ConnectionId from) {
@@ -80,6 +81,10 @@ CommandVerdict RobotEndpoint::command(const Command& command, ConnectionId from)
     locked([&](TimePoint now) { handshake_.on_report(report, now); });
   }
   return outcome.verdict;
+}
+
+CommandVerdict RobotEndpoint::position(const PositionBlock& position, ConnectionId from) {
+  return locked([&](TimePoint now) { return handshake_.on_position(position, from, now); });
 }
 
 void RobotEndpoint::disconnected(ConnectionId connection) {

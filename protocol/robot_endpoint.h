@@ -34,10 +34,12 @@ class RobotEndpoint : public RobotLink {
   void exposure_done(std::uint32_t request_id) override;
   void publish(const Report& report) override;
 
-  // For the wire. A connection's number is never used again, also not on another wire.
-  ConnectionId new_connection();
+  // For the wire. A connection's number is never used again, also not on another wire. 0 and 1 are free for a
+  // wire's own events.
+  static ConnectionId new_connection();
   // A command that is accepted and that the cycle has to carry out has been handed over on return.
   CommandVerdict command(const Command& command, ConnectionId from);
+  CommandVerdict position(const PositionBlock& position, ConnectionId from);
   void disconnected(ConnectionId connection);
   // What the robot gets that reads now, with its age.
   ResultBlock block();
@@ -64,7 +66,6 @@ class RobotEndpoint : public RobotLink {
   mutable std::mutex mutex_;  // guards what follows
   Handshake handshake_;
   std::optional<std::uint16_t> tapped_sequence_;
-  ConnectionId last_connection_ = 0;
   std::mutex wake_mutex_;
   std::function<void()> wake_;
 };

@@ -1,4 +1,4 @@
-// Corrections out: the one interface behind which Modbus and CAN stand.
+// Corrections out: the interfaces between the cycle and the daemon's main loop here, Modbus and CAN there.
 #pragma once
 
 #include <functional>
@@ -7,7 +7,7 @@
 
 namespace zeropose {
 
-// Owns its own thread and the handshake with one robot. Thread-safe.
+// The handshake with one robot. Thread-safe.
 class RobotLink {
  public:
   virtual ~RobotLink() = default;
@@ -19,5 +19,13 @@ class RobotLink {
 
 // Called from the link's thread for every accepted command that the cycle has to carry out. Must not block.
 using RequestHandler = std::function<void(const Request&)>;
+
+// What robots hang on: a server or a client of Modbus, a CAN node. Owns its own thread.
+class Wire {
+ public:
+  virtual ~Wire() = default;
+  // Of the thread's loop: grows at least twice a second while it is alive.
+  virtual std::uint64_t rounds() const = 0;
+};
 
 }  // namespace zeropose

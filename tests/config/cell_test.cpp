@@ -343,7 +343,7 @@ TEST(Cell, TwoRobotsNeedTheirOwnPorts) {
   EXPECT_THAT(
       mistakes_in(json),
       ElementsAre("cell.json: robots[1].link.port: found 127.0.0.1:1502, as in robots[0].link, expected a "
-                  "port of its own for each robot"));
+                  "port or a unit id of its own for each robot"));
   json["robots"][1]["link"]["address"] = "0.0.0.0";
   EXPECT_EQ(mistakes_in(json).size(), 1U);
   json["robots"][1]["link"]["address"] = "127.0.0.2";

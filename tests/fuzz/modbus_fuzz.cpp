@@ -24,7 +24,7 @@ struct Frames {
 };
 
 Frames frames_of(std::span<const std::uint8_t> bytes, std::size_t piece) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   Frames frames;
   for (std::size_t at = 0; at < bytes.size(); at += piece) {
     reader.feed(bytes.subspan(at, std::min(piece, bytes.size() - at)));
@@ -58,6 +58,9 @@ class Link {
     const ResultBlock before = handshake_.block(now_);
     if (ruling.kind == Ruling::Kind::command) {
       command(request, before);
+    } else if (ruling.kind == Ruling::Kind::position) {
+      position(request);
+      require(handshake_.block(now_) == before, "a position alone changes nothing");
     } else {
       require(handshake_.block(now_) == before, "a request that is no command changes nothing");
     }
@@ -65,12 +68,19 @@ class Link {
   }
 
  private:
+  void position(const Adu& request) {
+    require(may_write_, "only writers tell positions");
+    const auto decoded = decode_position(written_registers(request), require_crc_);
+    if (decoded) handshake_.on_position(*decoded, 1, now_);
+  }
+
   void command(const Adu& request, const ResultBlock& before) {
     require(may_write_, "only writers command");
-    const CommandRegisters registers = command_registers(request);
+    const auto registers = written_registers(request);
     const auto decoded = decode_command(registers, require_crc_);
     if (!decoded) return;
-    if (require_crc_) require(encode_command(*decoded) == registers, "a command has its CRC");
+    if (require_crc_)
+      require(std::ranges::equal(encode_command(*decoded), registers), "a command has its CRC");
     const CommandOutcome outcome = handshake_.on_command(*decoded, 1, now_);
     if (outcome.verdict != CommandVerdict::accepted) {
       require(handshake_.block(now_) == before, "a refused command changes nothing");

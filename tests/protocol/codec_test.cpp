@@ -335,5 +335,44 @@ TEST(Codec, CommandOfWrongLengthOrCrc) {
   EXPECT_TRUE(decode_command(r, false));
 }
 
+TEST(Codec, EveryRegisterOfThePositionBlock) {
+  PositionBlock position{0x01020304, no_values};
+  for (std::size_t i = 0; i < 6; ++i) position.values[i] = -static_cast<std::int32_t>(i) - 1;
+  const PositionRegisters r = encode_position(position);
+  std::vector<std::uint8_t> bytes{0x5A, 0x51, 1, 2, 3, 4};
+  for (std::uint8_t i = 0; i < 6; ++i)
+    bytes.insert(bytes.end(), {0xFF, 0xFF, 0xFF, static_cast<std::uint8_t>(0xFF - i)});
+  for (int i = 0; i < 2; ++i) bytes.insert(bytes.end(), {0x80, 0, 0, 0});
+  const std::uint32_t crc = slow_crc(bytes);
+  EXPECT_EQ(r, (PositionRegisters{0x0102,
+                                  0x0304,
+                                  0xFFFF,
+                                  0xFFFF,
+                                  0xFFFF,
+                                  0xFFFE,
+                                  0xFFFF,
+                                  0xFFFD,
+                                  0xFFFF,
+                                  0xFFFC,
+                                  0xFFFF,
+                                  0xFFFB,
+                                  0xFFFF,
+                                  0xFFFA,
+                                  0x8000,
+                                  0,
+                                  0x8000,
+                                  0,
+                                  static_cast<std::uint16_t>(crc >> 16),
+                                  static_cast<std::uint16_t>(crc)}));
+  EXPECT_EQ(decode_position(r), position);
+  EXPECT_FALSE(decode_position(std::span(r).first(19)));
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    PositionRegisters damaged = r;
+    damaged[i] ^= 1;
+    EXPECT_FALSE(decode_position(damaged)) << i;
+    EXPECT_TRUE(decode_position(damaged, false)) << i;
+  }
+}
+
 }  // namespace
 }  // namespace zeropose

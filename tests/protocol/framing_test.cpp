@@ -13,7 +13,7 @@ namespace {
 Bytes read_block(std::uint16_t transaction = 7) { return adu(transaction, read_pdu(4, 0, 61)); }
 
 std::optional<FrameProblem> problem_of(const Bytes& bytes) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   reader.feed(bytes);
   while (reader.next()) continue;
   return reader.problem();
@@ -26,7 +26,7 @@ Bytes joined(std::initializer_list<Bytes> parts) {
 }
 
 TEST(Framing, AWholeRequest) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   reader.feed(read_block());
   const auto request = reader.next();
   ASSERT_TRUE(request);
@@ -40,7 +40,7 @@ TEST(Framing, AWholeRequest) {
 
 TEST(Framing, ByteByByte) {
   const Bytes bytes = adu(1, command_pdu({5, 1, 1, 2, 3}));
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     EXPECT_FALSE(reader.next()) << i;
     EXPECT_EQ(reader.has_partial_frame(), i > 0);
@@ -48,11 +48,11 @@ TEST(Framing, ByteByByte) {
   }
   const auto request = reader.next();
   ASSERT_TRUE(request);
-  EXPECT_EQ(decode_command(command_registers(*request)), (Command{5, 1, 1, 2, 3}));
+  EXPECT_EQ(decode_command(written_registers(*request)), (Command{5, 1, 1, 2, 3}));
 }
 
 TEST(Framing, TwoRequestsInOneSegmentAreTwoFrames) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   reader.feed(joined({read_block(1), read_block(2), {0, 3, 0}}));
   EXPECT_EQ(reader.next()->word(0), 1);
   EXPECT_EQ(reader.next()->word(0), 2);
@@ -104,7 +104,7 @@ TEST(Framing, LengthMustFitTheFunction) {
 }
 
 TEST(Framing, NothingComesOutAfterAProblem) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   reader.feed(joined({{0, 1, 0, 9, 0, 6}, read_block()}));
   EXPECT_FALSE(reader.next());
   reader.feed(read_block());
@@ -119,7 +119,7 @@ TEST(Framing, CutAnywhere) {
       joined({read_block(1), adu(2, command_pdu({9, 1, 1, 0, 0})), adu(3, {6, 0, 1, 0, 2}), read_block(4)});
   std::mt19937 random(3);
   for (int run = 0; run < 200; ++run) {
-    FrameReader reader(1);
+    FrameReader reader(UnitSet().set(1));
     int transaction = 0;
     for (std::size_t at = 0; at < bytes.size();) {
       const std::size_t size = std::min<std::size_t>(1 + random() % 30, bytes.size() - at);
@@ -132,7 +132,7 @@ TEST(Framing, CutAnywhere) {
 }
 
 Ruling ruling(const Bytes& pdu, bool may_write = true) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   reader.feed(adu(1, pdu));
   const auto request = reader.next();
   EXPECT_TRUE(request);
@@ -170,8 +170,18 @@ TEST(Rules, WritesOfTheCommandBlockOnly) {
   EXPECT_EQ(exception_of(write_pdu(1001, std::span(many).first(9))), 3);
   EXPECT_EQ(exception_of(write_pdu(999, std::span(many).first(10))), 2);
   EXPECT_EQ(exception_of(write_pdu(0, std::span(many).first(61))), 2);
-  EXPECT_EQ(exception_of(write_pdu(1100, std::span(many).first(10))), 2);
+  EXPECT_EQ(exception_of(write_pdu(1010, std::span(many).first(10))), 2);
+  EXPECT_EQ(exception_of(write_pdu(1000, std::span(many).first(100))), 2);
   EXPECT_EQ(exception_of(write_pdu(1000, std::span(many).first(10)), false), 1);
+}
+
+TEST(Rules, WritesOfThePositionBlockOnlyAsAWhole) {
+  const std::vector<std::uint16_t> many(100);
+  EXPECT_EQ(ruling(write_pdu(1100, std::span(many).first(20))).kind, Ruling::Kind::position);
+  EXPECT_EQ(exception_of(write_pdu(1100, std::span(many).first(10))), 3);
+  EXPECT_EQ(exception_of(write_pdu(1100, std::span(many).first(21))), 2);
+  EXPECT_EQ(exception_of(write_pdu(1099, std::span(many).first(20))), 2);
+  EXPECT_EQ(exception_of(write_pdu(1100, std::span(many).first(20)), false), 1);
 }
 
 TEST(Rules, NoOtherFunction) {
@@ -183,7 +193,7 @@ TEST(Rules, NoOtherFunction) {
 }
 
 Adu parse(const Bytes& bytes) {
-  FrameReader reader(1);
+  FrameReader reader(UnitSet().set(1));
   reader.feed(bytes);
   return reader.next().value();
 }

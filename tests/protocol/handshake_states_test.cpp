@@ -257,7 +257,7 @@ TEST_F(HandshakeTest, ResetClearsTheErrorFromAnotherSession) {
 
 TEST_F(HandshakeTest, UnknownCommandsAreAnswered) {
   std::uint32_t id = 0;
-  for (const int kind : {0, 7, 10, 65535}) {
+  for (const int kind : {0, 10, 65535}) {
     EXPECT_FALSE(
         handshake->on_command({++id, static_cast<std::uint16_t>(kind), 0, 0, 0}, robot, now).request);
     expect_not_ok(id, 101);
@@ -276,6 +276,59 @@ TEST_F(HandshakeTest, BadOptionsAreRefused) {
   refused([](auto& o) { o.zero_deadline = milliseconds(-1); });
   refused([](auto& o) { o.epoch = 0; });
   refused([](auto& o) { o.convention = Convention::matrix; });
+}
+
+class AtPositionTest : public HandshakeTest {
+ protected:
+  PositionBlock position(std::uint32_t index) const {
+    return {index, *to_wire(Convention::kuka, from_six_numbers({700, -20, 900, 10, 20, 30}))};
+  }
+};
+
+TEST_F(AtPositionTest, CarriesThePoseThatWasWrittenBefore) {
+  EXPECT_EQ(handshake->on_position(position(4), robot, now), CommandVerdict::accepted);
+  const auto outcome = command(CommandKind::at_position, 1, 4);
+  ASSERT_TRUE(outcome.request);
+  EXPECT_EQ(outcome.request->kind, CommandKind::at_position);
+  EXPECT_EQ(outcome.request->argument, 4);
+  EXPECT_LT((outcome.request->X_RH.translation() - Eigen::Vector3d(700, -20, 900)).norm(), 1e-9);
+  EXPECT_TRUE(block().has(status_bit::busy));
+  report(ok_report(1));
+  expect_done(1);
+  // Each position counts once.
+  EXPECT_FALSE(command(CommandKind::at_position, 2, 4).request);
+  expect_not_ok(2, 106);
+}
+
+TEST_F(AtPositionTest, TheWrongIndexOrConnectionIsRefused) {
+  handshake->on_position(position(4), robot, now);
+  command(CommandKind::at_position, 1, 5);
+  expect_not_ok(1, 106);
+  handshake->on_position(position(4), other, now);
+  command(CommandKind::at_position, 2, 4);
+  expect_not_ok(2, 106);
+}
+
+TEST_F(AtPositionTest, WhatIsNoPoseIsRefused) {
+  PositionBlock wrong = position(4);
+  wrong.values[2] = invalid_value;
+  EXPECT_EQ(handshake->on_position(wrong, robot, now), CommandVerdict::wrong_argument);
+  wrong = position(4);
+  wrong.values[6] = 0;
+  EXPECT_EQ(handshake->on_position(wrong, robot, now), CommandVerdict::wrong_argument);
+  command(CommandKind::at_position, 1, 4);
+  expect_not_ok(1, 106);
+}
+
+TEST_F(AtPositionTest, NothingIsTakenWhileBusyOrHalted) {
+  measure(1);
+  EXPECT_EQ(handshake->on_position(position(4), robot, now), CommandVerdict::busy);
+  report(ok_report(1));
+  expect_valid(1);
+  command(CommandKind::halt, 2);
+  EXPECT_EQ(handshake->on_position(position(4), robot, now), CommandVerdict::accepted);
+  command(CommandKind::at_position, 3, 4);
+  expect_not_ok(3, 105);
 }
 
 }  // namespace

@@ -19,23 +19,31 @@ class LinkTest : public testing::Test {
  protected:
   LinkTest() : recorder({Convention::kuka, 3, default_result_data_id}) {
     options.port = 0;
-    options.handshake.convention = Convention::kuka;
-    options.handshake.frame = 3;
-    options.handshake.robot_index = 3;
-    options.tap = recorder.tap();
+    handshake.convention = Convention::kuka;
+    handshake.frame = 3;
+    handshake.robot_index = 3;
   }
   ~LinkTest() override {
-    link.reset();
+    stop();
     EXPECT_EQ(recorder.violations(), std::vector<std::string>());
   }
 
   void start() {
-    link.emplace(options, [this](const Request& request) {
+    start_with_handler([this](const Request& request) {
       const std::scoped_lock lock(mutex);
       requests.push_back(request);
       came.notify_all();
     });
-    link->set_cell_state(ready_cell());
+  }
+  void start_with_handler(RequestHandler handler) {
+    stop();
+    endpoint.emplace(EndpointOptions{handshake, watched ? recorder.tap() : nullptr}, std::move(handler));
+    endpoint->set_cell_state(ready_cell());
+    server.emplace(options, std::vector<ModbusTcpServer::Served>{{served, *endpoint}});
+  }
+  void stop() {
+    server.reset();
+    endpoint.reset();
   }
 
   std::optional<Request> next_request() {
@@ -61,7 +69,7 @@ class LinkTest : public testing::Test {
   }
   void publish(const Report& report) {
     recorder.reported(report);
-    link->publish(report);
+    endpoint->publish(report);
   }
 
   int measure(RawModbus& client, std::uint32_t id) {
@@ -73,7 +81,7 @@ class LinkTest : public testing::Test {
     ASSERT_EQ(measure(client, id), 0);
     const auto request = next_request();
     ASSERT_TRUE(request);
-    link->exposure_done(id);
+    endpoint->exposure_done(id);
     publish(ok_report(*request));
     const ResultBlock block = client.block();
     EXPECT_EQ(block.request_id, id);
@@ -89,11 +97,15 @@ class LinkTest : public testing::Test {
   }
 
   ModbusServerOptions options;
+  ModbusTcpRobot served;
+  HandshakeOptions handshake;
+  bool watched = true;
   Recorder recorder;
   std::mutex mutex;
   std::condition_variable came;
   std::deque<Request> requests;
-  std::optional<ModbusTcpLink> link;
+  std::optional<RobotEndpoint> endpoint;
+  std::optional<ModbusTcpServer> server;
 };
 
 }  // namespace zeropose

@@ -40,9 +40,9 @@ class Cycle {
     take({});
     thread_.join();
   }
-  void attach(ModbusTcpLink& link) {
-    link_ = &link;
-    link.set_cell_state(cell_);
+  void attach(RobotEndpoint& endpoint) {
+    endpoint_ = &endpoint;
+    endpoint.set_cell_state(cell_);
   }
   // A request with id 0 ends the thread; a robot cannot send one.
   void take(const Request& request) {
@@ -65,17 +65,17 @@ class Cycle {
   }
   void answer(const Request& request) {
     std::this_thread::sleep_for(milliseconds(200));
-    link_->exposure_done(request.id);
+    endpoint_->exposure_done(request.id);
     std::this_thread::sleep_for(milliseconds(200));
     if (request.kind == CommandKind::zero) {
       cell_.zero_id = 0x0A0B0C0D;
-      link_->set_cell_state(cell_);
+      endpoint_->set_cell_state(cell_);
     }
-    link_->publish(report_for(request));
+    endpoint_->publish(report_for(request));
   }
 
   CellState cell_;
-  ModbusTcpLink* link_ = nullptr;
+  RobotEndpoint* endpoint_ = nullptr;
   std::mutex mutex_;
   std::condition_variable came_;
   std::deque<Request> requests_;
@@ -83,17 +83,19 @@ class Cycle {
 };
 
 int serve() {
-  ModbusServerOptions options;
-  options.port = 0;
+  EndpointOptions options;
   options.handshake.convention = Convention::kuka;
   options.handshake.frame = 3;
   options.handshake.robot_index = 2;
   options.handshake.validity = milliseconds(2000);
   options.handshake.measure_deadline = milliseconds(2000);
   Cycle cycle(CellState{true, true, true, true, 0x01020304, 0x05060708, 0x09090909});
-  ModbusTcpLink link(options, [&](const Request& request) { cycle.take(request); });
-  cycle.attach(link);
-  std::cout << "port " << link.port() << std::endl;
+  RobotEndpoint endpoint(options, [&](const Request& request) { cycle.take(request); });
+  cycle.attach(endpoint);
+  ModbusServerOptions any_port;
+  any_port.port = 0;
+  const ModbusTcpServer server(any_port, {{ModbusTcpRobot{}, endpoint}});
+  std::cout << "port " << server.port() << std::endl;
   for (std::string line; std::getline(std::cin, line);) continue;
   cycle.stop();
   return 0;

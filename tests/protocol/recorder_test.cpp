@@ -139,9 +139,9 @@ class WildCycle {
     came_.notify_all();
     thread_.join();
   }
-  void attach(ModbusTcpLink* link) {
+  void attach(RobotEndpoint* endpoint) {
     const std::scoped_lock lock(mutex_);
-    link_ = link;
+    endpoint_ = endpoint;
   }
   void take(const Request& request) {
     const std::scoped_lock lock(mutex_);
@@ -166,24 +166,24 @@ class WildCycle {
     const auto fate = random_() % 20;
     if (fate == 0) return;
     if (fate == 1) std::this_thread::sleep_for(milliseconds(40));
-    link_->exposure_done(request.id);
+    endpoint_->exposure_done(request.id);
     Report report = report_of(request.id);
     report.ticket = request.ticket;
     report.correction.translation().x() = 0.001 * (request.id % 1000);
     if (fate == 2) report.code = Code::deviation_not_attributable;
     if (fate == 3) report.correction.translation().z() = 1e9;
     if (fate == 4) publish_foreign(request);
-    if (fate == 5) link_->set_cell_state(ready_cell());
+    if (fate == 5) endpoint_->set_cell_state(ready_cell());
     recorder_.reported(report);
-    link_->publish(report);
-    if (fate == 6) link_->publish(report);
+    endpoint_->publish(report);
+    if (fate == 6) endpoint_->publish(report);
   }
 
   // The id may even be that of the request that follows, when this one is late: the ticket is not.
   void publish_foreign(const Request& request) {
     Report foreign = report_of(request.id + 1);
     foreign.ticket = request.ticket;
-    link_->publish(foreign);
+    endpoint_->publish(foreign);
   }
 
   Recorder& recorder_;
@@ -191,24 +191,23 @@ class WildCycle {
   std::mutex mutex_;
   std::condition_variable came_;
   std::deque<Request> requests_;
-  ModbusTcpLink* link_ = nullptr;
+  RobotEndpoint* endpoint_ = nullptr;
   bool stopping_ = false;
   std::thread thread_;
 };
 
 // Robots come and go, others disturb, the cycle is wild: never a wrong valid result, and enough right ones.
 TEST_F(LinkTest, Storm) {
-  options.handshake.measure_deadline = milliseconds(20);
-  options.handshake.validity = milliseconds(300);
+  handshake.measure_deadline = milliseconds(20);
+  handshake.validity = milliseconds(300);
   WildCycle cycle(recorder, 30);
-  link.emplace(options, [&](const Request& request) { cycle.take(request); });
-  cycle.attach(&*link);
-  link->set_cell_state(ready_cell());
-  recorder.watch("127.0.0.1", link->port());
-  recorder.watch("127.0.0.1", link->port());
+  start_with_handler([&](const Request& request) { cycle.take(request); });
+  cycle.attach(&*endpoint);
+  recorder.watch("127.0.0.1", server->port());
+  recorder.watch("127.0.0.1", server->port());
 
   SimulatedRobotOptions robot_options;
-  robot_options.port = link->port();
+  robot_options.port = server->port();
   robot_options.convention = Convention::kuka;
   robot_options.frame = 3;
   robot_options.robot_index = 3;
@@ -217,7 +216,7 @@ TEST_F(LinkTest, Storm) {
   std::thread disturber([&] {
     std::mt19937 random(31);
     while (!stop) {
-      RawModbus client(link->port());
+      RawModbus client(server->port());
       for (int i = 0; i < 20 && !stop; ++i) {
         Bytes bytes = adu(1, random() % 2 ? command_pdu({0, 1, 1, 0, 0}) : read_pdu(4, 0, 61));
         if (random() % 4 == 0) bytes[random() % bytes.size()] ^= 0x40;
@@ -248,10 +247,9 @@ TEST_F(LinkTest, Storm) {
 
 // One snapshot for each answer, however fast the block changes.
 TEST_F(LinkTest, ManyReadersNeverSeeATornBlock) {
-  link.emplace(options, [&](const Request& request) { publish(ok_report(request)); });
-  link->set_cell_state(ready_cell());
-  for (int i = 0; i < 4; ++i) recorder.watch("127.0.0.1", link->port());
-  RawModbus client(link->port());
+  start_with_handler([&](const Request& request) { publish(ok_report(request)); });
+  for (int i = 0; i < 4; ++i) recorder.watch("127.0.0.1", server->port());
+  RawModbus client(server->port());
   for (std::uint32_t id = 1; id <= 1000; ++id) ASSERT_EQ(measure(client, id), 0);
   wait_until([&] { return recorder.blocks() > 5000; });
   recorder.stop();

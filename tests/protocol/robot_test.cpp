@@ -136,15 +136,14 @@ class RobotTest : public LinkTest {
  protected:
   // A cycle that answers at once as `answer` says.
   void start_with(std::function<std::optional<Report>(const Request&)> answer) {
-    link.emplace(options, [this, answer](const Request& request) {
+    start_with_handler([this, answer](const Request& request) {
       last = request;
       if (request.kind == CommandKind::measure) recorder.requested(request.id);
-      link->exposure_done(request.id);
+      endpoint->exposure_done(request.id);
       if (const auto report = answer(request)) publish(*report);
     });
-    link->set_cell_state(ready_cell());
     SimulatedRobotOptions robot_options = kuka_options();
-    robot_options.port = link->port();
+    robot_options.port = server->port();
     robot_options.patience = milliseconds(1000);
     robot.emplace(robot_options);
   }
@@ -192,7 +191,7 @@ TEST_F(RobotTest, RefusesBeyondItsOwnLimits) {
 }
 
 TEST_F(RobotTest, ASilentCycleIsATimeOut) {
-  options.handshake.measure_deadline = milliseconds(50);
+  handshake.measure_deadline = milliseconds(50);
   start_with([](const Request&) { return std::nullopt; });
   const RobotAnswer answer = robot->measure(1, 1);
   EXPECT_EQ(answer.refusal, "not ok");
@@ -200,7 +199,7 @@ TEST_F(RobotTest, ASilentCycleIsATimeOut) {
 }
 
 TEST_F(RobotTest, ARobotLosesPatienceBeforeALateAnswer) {
-  options.handshake.measure_deadline = milliseconds(10000);
+  handshake.measure_deadline = milliseconds(10000);
   start_with([](const Request&) { return std::nullopt; });
   EXPECT_EQ(robot->measure(1, 1).refusal, "still busy");
   EXPECT_EQ(robot->measure(1, 1).exception, 6);
@@ -210,18 +209,16 @@ TEST_F(RobotTest, EveryConventionArrives) {
   const Pose truth = from_six_numbers({1.5, -2.25, 3, 4, -5, 6});
   for (const Convention convention : all_conventions()) {
     if (convention == Convention::matrix) continue;
-    link.reset();
-    options.tap = {};
-    options.handshake.convention = convention;
-    link.emplace(options, [&](const Request& request) {
+    watched = false;  // the recorder knows one convention
+    handshake.convention = convention;
+    start_with_handler([&](const Request& request) {
       Report report = ok_report(request);
       report.correction = truth;
-      link->publish(report);
+      endpoint->publish(report);
     });
-    link->set_cell_state(ready_cell());
     SimulatedRobotOptions robot_options = kuka_options();
     robot_options.convention = convention;
-    robot_options.port = link->port();
+    robot_options.port = server->port();
     const RobotAnswer answer = SimulatedRobot(robot_options).measure(1, 1);
     ASSERT_TRUE(answer.ok()) << name_of(convention) << ": " << answer.refusal;
     const Vector6 d = difference(truth, *answer.correction);
@@ -270,18 +267,18 @@ TEST_F(RobotTest, AZeroThatFailedIsNotOk) {
 TEST_F(RobotTest, NobodyThere) {
   start_with([](const Request& request) { return ok_report(request); });
   ASSERT_TRUE(robot->measure(1, 1).ok());
-  link.reset();
+  stop();
   EXPECT_EQ(robot->measure(1, 1).refusal, "connection lost");
   EXPECT_NE(robot->measure(1, 1).refusal.find("no connection"), std::string::npos);
 }
 
 TEST_F(RobotTest, ARestartInMidRequestIsRefused) {
-  options.handshake.measure_deadline = milliseconds(10000);
+  handshake.measure_deadline = milliseconds(10000);
   start_with([](const Request&) { return std::nullopt; });
   std::optional<RobotAnswer> answer;
   std::thread thread([&] { answer = robot->measure(1, 1); });
-  wait_until([&] { return link->counters().handshake.accepted == 1; });
-  link.reset();
+  wait_until([&] { return endpoint->counters().accepted == 1; });
+  server.reset();
   thread.join();
   EXPECT_FALSE(answer->ok());
   EXPECT_FALSE(answer->correction);

@@ -48,9 +48,15 @@ Bytes write_pdu(std::uint16_t first, std::span<const std::uint16_t> registers) {
 
 Bytes command_pdu(const Command& command) { return write_pdu(command_reg::first, encode_command(command)); }
 
-RawModbus::RawModbus(std::uint16_t port, const std::string& address)
+RawModbus::RawModbus(std::uint16_t port, const std::string& address, const std::string& own_address)
     : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
   sockaddr_in name{};
+  if (!own_address.empty()) {
+    name.sin_family = AF_INET;
+    inet_pton(AF_INET, own_address.c_str(), &name.sin_addr);
+    if (bind(socket_.get(), reinterpret_cast<const sockaddr*>(&name), sizeof name) != 0)
+      throw std::runtime_error(std::string("test client: ") + std::strerror(errno));
+  }
   name.sin_family = AF_INET;
   name.sin_port = htons(port);
   inet_pton(AF_INET, address.c_str(), &name.sin_addr);

@@ -23,7 +23,9 @@ Bytes command_pdu(const Command& command);
 class RawModbus {
  public:
   // Throws std::runtime_error when nobody listens.
-  explicit RawModbus(std::uint16_t port, const std::string& address = "127.0.0.1");
+  // The client's own address: empty: whatever the system takes.
+  explicit RawModbus(std::uint16_t port, const std::string& address = "127.0.0.1",
+                     const std::string& own_address = {});
 
   void send(const Bytes& bytes);  // what the peer does not take any more is lost
   // One whole ADU; empty: closed by the peer, or nothing for two seconds.

@@ -52,8 +52,8 @@ void Recorder::poll(const std::string& address, std::uint16_t port, std::uint8_t
   }
 }
 
-std::function<void(const ResultRegisters&)> Recorder::tap() {
-  return [this](const ResultRegisters& registers) { see(registers, Clock::now()); };
+std::function<void(const ResultBlock&)> Recorder::tap() {
+  return [this](const ResultBlock& block) { see(encode(block, options_.data_id), Clock::now()); };
 }
 
 void Recorder::see(std::span<const std::uint16_t> registers, Clock::time_point read_started) {

@@ -38,8 +38,8 @@ class Recorder {
   // it must.
   void watch(const std::string& address, std::uint16_t port, std::uint8_t unit = 1);
   void stop();
-  // For ModbusServerOptions::tap. The recorder must outlive the link.
-  std::function<void(const ResultRegisters&)> tap();
+  // For EndpointOptions::tap. The recorder must outlive the endpoint.
+  std::function<void(const ResultBlock&)> tap();
   void see(std::span<const std::uint16_t> registers, Clock::time_point read_started);
 
   void requested(std::uint32_t id);     // before the Measure is written; each id once

@@ -69,3 +69,10 @@ def command(request_id, kind, job=0, part=0, argument=0, data_id=0x5A51):
     raw = struct.pack(">IHHIi", request_id, kind, job, part, argument)
     return list(struct.unpack(">8H", raw)) + list(
         struct.unpack(">2H", struct.pack(">I", crc32_autosar(struct.pack(">H", data_id) + raw))))
+
+
+def position(index, values, data_id=0x5A51):
+    """The twenty registers of the position block."""
+    raw = struct.pack(">I8i", index, *values, *[INVALID] * (8 - len(values)))
+    return list(struct.unpack(">18H", raw)) + list(
+        struct.unpack(">2H", struct.pack(">I", crc32_autosar(struct.pack(">H", data_id) + raw))))

@@ -9,7 +9,7 @@ import sys
 import time
 
 from block import (ACKNOWLEDGE, AT_POSITION, BUSY, ERROR, EXPOSED, HALT, HEARTBEAT, INVALID, MEASURE, NOT_OK, READY,
-                   RESET, RESUME, SELECT_JOB, SIMULATED, SKIPPED, VALID, ZERO, Block, command)
+                   RESET, RESUME, SELECT_JOB, SIMULATED, SKIPPED, VALID, ZERO, Block, command, position)
 from server import arguments, running
 
 try:
@@ -18,7 +18,7 @@ except ImportError as missing:
     print(f"skipped: pymodbus is not here ({missing}); apt-get install python3-pymodbus")
     sys.exit(SKIPPED)
 
-COMMANDS = 1000
+COMMANDS, POSITION = 1000, 1100
 
 
 class Peer:
@@ -180,7 +180,11 @@ def zero_and_states(peer):
     assert done(MEASURE, job=1).code == 105
     assert done(RESUME).state == 2
     assert done(RESET).code == 0
-    assert done(AT_POSITION).code == 101
+    assert done(AT_POSITION, argument=3).code == 106, "no position was told"
+    assert peer.write(position(3, [1000, -2000, 3000, 100000, -200000, 300000]), POSITION) == 0
+    told = done(AT_POSITION, argument=3)
+    assert told.code == 0 and not told.status & (VALID | NOT_OK)
+    assert peer.write(position(3, [1000, -2000, 3000]), POSITION) == 3, "half a pose"
     assert peer.send(HEARTBEAT)[1] == 0
     assert not peer.block().has(ERROR)
 
