@@ -94,12 +94,12 @@ std::optional<CanValues> to_can_values(const WireValues& values, const CanCoding
   return steps;
 }
 
-ResultBlock fit_to_can(ResultBlock block, const CanCoding& coding) {
+ResultBlock fit_to_can(ResultBlock block, const CanCoding& coding, bool fd) {
   if (block.request_id > 0xFFFF) {
     clear_report(block);
     block.request_id = 0;
   }
-  if (block.has(status_bit::result_valid) && !to_can_values(block.values, coding)) {
+  if (!fd && block.has(status_bit::result_valid) && !to_can_values(block.values, coding)) {
     clear_report(block);
     block.status |= status_bit::not_ok;
     block.code = static_cast<std::uint16_t>(Code::value_out_of_range);

@@ -52,8 +52,8 @@ std::optional<Command> decode_can_command(const CanFrame& frame, std::uint32_t n
 CanFrame encode_can_command(const Command& command, std::uint32_t node);
 
 // The block as this wire can show it: an answer to a request id of more than 16 bits was asked for elsewhere
-// and is none; with int16 a valid result that does not fit becomes not ok with value_out_of_range.
-ResultBlock fit_to_can(ResultBlock block, const CanCoding& coding);
+// and is none; without CAN FD a valid result that does not fit becomes not ok with value_out_of_range.
+ResultBlock fit_to_can(ResultBlock block, const CanCoding& coding, bool fd = false);
 // nullopt: a value does not fit.
 std::optional<CanValues> to_can_values(const WireValues& values, const CanCoding& coding);
 std::uint8_t can_status_of(std::uint16_t status);

@@ -27,6 +27,13 @@ constexpr int frames_per_round = 64;
 }  // namespace
 
 class CanLink::Loop {
+ private:
+  template <class Value>
+  Value copy(Value Loop::*member) const {
+    const std::scoped_lock lock(mutex_);
+    return this->*member;
+  }
+
  public:
   Loop(const CanOptions& options, RobotEndpoint& endpoint);
   ~Loop();
@@ -36,12 +43,6 @@ class CanLink::Loop {
   std::string problem() const { return copy(&Loop::problem_); }
 
  private:
-  template <class Member>
-  auto copy(Member member) const {
-    const std::scoped_lock lock(mutex_);
-    return this->*member;
-  }
-
   void wake();
   void run();
   void round();

@@ -243,7 +243,7 @@ void CanNode::acknowledge_fault() {
 
 // A latched fault hides every correction.
 ResultBlock CanNode::on_this_wire(ResultBlock block) const {
-  block = fit_to_can(block, state_.coding);
+  block = fit_to_can(block, state_.coding, options_.fd);
   if (state_.fault == CanFault::none) return block;
   block.status |= status_bit::error;
   block.status &= static_cast<std::uint16_t>(~status_bit::ready);
