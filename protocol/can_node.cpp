@@ -13,7 +13,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr std::size_t max_emergencies = 8;
-constexpr milliseconds probe_time{500};
+constexpr milliseconds probe_time{100};
 
 // Classes of error frames (linux/can/error.h).
 constexpr std::uint32_t error_bus_off = 0x40, error_restarted = 0x100;

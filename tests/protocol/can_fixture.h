@@ -129,6 +129,32 @@ class CanNodeTest : public testing::Test {
     EXPECT_EQ(of_id(0x585).data[0], 0x60);
   }
 
+  // Between a Measure and its report.
+  void disturb(std::uint32_t fault, std::uint32_t id) {
+    switch (fault) {
+      case 4:
+        return take(of_id(0x185));  // somebody else sends our frame
+      case 5:
+        take(error_frame(0x40));
+        return take(error_frame(0x100));
+      case 6:
+        node->link_down();
+        handshake->on_disconnect(connection++, now);
+        step();
+        node->link_up(now);
+        return step();
+      case 7:
+        return report(id, Code::too_few_marks);
+      case 8:  // nobody listens for a while
+        bus_takes = false;
+        return;
+      case 9:  // another command, which is refused
+        return measure(id + 1);
+      default:
+        return;
+    }
+  }
+
   // The last one sent.
   CanFrame of_id(std::uint32_t id) const {
     for (auto frame = all_sent.rbegin(); frame != all_sent.rend(); ++frame)

@@ -413,6 +413,46 @@ TEST_F(CanNodeTest, ReplayedTrafficIsNeverAResult) {
   expect_clean_cycle(61);
 }
 
+// A robot that takes its results by the rules, on a bus where anything fails at any moment: it never gets a
+// wrong one, and a cycle without a fault always ends valid.
+TEST_F(CanNodeTest, NoFaultMakesAResultWrong) {
+  std::mt19937 random(80);
+  std::size_t valid = 0;
+  std::uint16_t id = 0;
+  CanResultCollector collector(coding());
+  for (std::size_t i = 0; i < amount(20000); ++i) {
+    const std::uint32_t what = static_cast<std::uint32_t>(random()) % 10;  // 0..3: no fault
+    id = static_cast<std::uint16_t>(id % 65000 + 1);
+    correction_x_mm = 0.01 * static_cast<double>(1 + i % 30000);
+    collector.expect(id, handshake_epoch());
+    const std::size_t begin = all_sent.size();
+    measure(id);
+    disturb(what, id);
+    report(id, Code::ok);
+    bus_takes = true;
+    if (what == 8) wait(600);
+    step();
+    std::optional<CanResult> result;
+    for (std::size_t k = begin; k < all_sent.size(); ++k)
+      if (const auto taken = collector.take(all_sent[k], now)) result = taken;
+    const bool is_valid = result && result->has(can_status::valid);
+    if (is_valid) {
+      ++valid;
+      ASSERT_EQ(result->request_id, id);
+      ASSERT_EQ(result->values[0], std::lround(100 * correction_x_mm));
+    }
+    if (what < 4) {
+      ASSERT_TRUE(is_valid) << i;
+    } else if (what < 8) {
+      ASSERT_FALSE(is_valid) << i << " fault " << what;
+    }
+    send_command(CommandKind::reset, ++id);
+    ASSERT_EQ(node->fault(), CanFault::none);
+    all_sent.clear();
+  }
+  EXPECT_GT(valid, amount(20000) / 3);
+}
+
 TEST(CanOptionsCheck, SaysWhatIsOutOfRange) {
   const auto message = [](auto change, Convention convention = Convention::kuka) {
     CanOptions options;
