@@ -121,9 +121,9 @@ Bytes FakeController::pdu_for(const Bytes& pdu) {
   };
   const std::size_t first = word(pdu, 1), count = word(pdu, 3);
   if (count > faults_.max_registers) return refuse(3);
-  if (pdu[0] == 3) {
+  if (pdu[0] == 3 || pdu[0] == 4) {
     if (faults_.refuses_reads) return refuse(2);
-    Bytes reply{3, static_cast<std::uint8_t>(2 * count)};
+    Bytes reply{pdu[0], static_cast<std::uint8_t>(2 * count)};
     for (std::size_t i = 0; i < count; ++i) put16(reply, registers_[first + i]);
     return reply;
   }
