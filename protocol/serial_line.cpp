@@ -1,6 +1,7 @@
 #include "protocol/serial_line.h"
 
 #include <fcntl.h>
+#include <linux/serial.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 
@@ -61,10 +62,20 @@ termios settings_of(const SerialLine& line) {
   // A character with wrong parity arrives as 0: the CRC of its frame is then wrong, the frame is not
   // shortened.
   settings.c_iflag = line.parity == 'N' ? IGNBRK : IGNBRK | INPCK;
+  settings.c_cc[VMIN] = 1;  // so that an empty line and one that has hung up read differently
   const speed_t speed = speed_of(line.baud)->constant;
   cfsetispeed(&settings, speed);
   cfsetospeed(&settings, speed);
   return settings;
+}
+
+// A USB adapter otherwise keeps bytes back for up to 16 ms. Not every driver knows it, and it also works
+// without, so what it answers is not looked at.
+void ask_for_low_latency(int device) {
+  serial_struct serial{};
+  if (ioctl(device, TIOCGSERIAL, &serial) != 0) return;
+  serial.flags |= ASYNC_LOW_LATENCY;
+  ioctl(device, TIOCSSERIAL, &serial);
 }
 
 }  // namespace
@@ -98,6 +109,7 @@ Descriptor open_line(const SerialLine& line) {
   if (ioctl(device.get(), TIOCEXCL) != 0) fail(line, "TIOCEXCL");
   const termios settings = settings_of(line);
   if (tcsetattr(device.get(), TCSANOW, &settings) != 0) fail(line, "tcsetattr");
+  ask_for_low_latency(device.get());
   if (tcflush(device.get(), TCIOFLUSH) != 0) fail(line, "tcflush");
   return device;
 }
