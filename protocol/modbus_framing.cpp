@@ -11,23 +11,6 @@ std::size_t word_at(const std::vector<std::uint8_t>& bytes, std::size_t at) {
   return static_cast<std::size_t>(bytes[at] << 8 | bytes[at + 1]);
 }
 
-// Other functions are answered with an exception, whatever follows them in the frame.
-bool pdu_is_whole(const Adu& adu) {
-  const std::size_t pdu = adu.size - header;
-  switch (adu.function()) {
-    case read_holding_registers:
-    case read_input_registers:
-      return pdu == 5;
-    case write_multiple_registers: {
-      if (pdu < 6) return false;
-      const std::size_t byte_count = adu.bytes[header + 5];
-      return byte_count >= 2 && byte_count == 2 * std::size_t{adu.quantity()} && pdu == 6 + byte_count;
-    }
-    default:
-      return true;
-  }
-}
-
 Ruling exception(std::uint8_t number) { return {Ruling::Kind::exception, number}; }
 
 Ruling rule_read(std::size_t first, std::size_t count) {
@@ -69,6 +52,22 @@ std::string_view name_of(FrameProblem problem) {
       return "length does not fit the function";
   }
   return "unknown";
+}
+
+bool pdu_is_whole(const Adu& adu) {
+  const std::size_t pdu = adu.size - header;
+  switch (adu.function()) {
+    case read_holding_registers:
+    case read_input_registers:
+      return pdu == 5;
+    case write_multiple_registers: {
+      if (pdu < 6) return false;
+      const std::size_t byte_count = adu.bytes[header + 5];
+      return byte_count >= 2 && byte_count == 2 * std::size_t{adu.quantity()} && pdu == 6 + byte_count;
+    }
+    default:
+      return true;
+  }
 }
 
 void FrameReader::feed(std::span<const std::uint8_t> bytes) {

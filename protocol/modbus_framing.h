@@ -46,6 +46,10 @@ struct Adu {
   std::span<const std::uint8_t> view() const { return std::span(bytes).first(size); }
 };
 
+// The length fits the function. Other functions than FC03, FC04 and FC16 are answered with an exception,
+// whatever follows them in the frame.
+bool pdu_is_whole(const Adu& adu);
+
 using UnitSet = std::bitset<256>;  // unit ids
 
 // Cuts one connection's bytes into requests. After a problem nothing more comes out.
