@@ -12,17 +12,17 @@ namespace zeropose {
 // Owns its own thread. An interface that is missing or down is no error: it is looked for again all the time,
 // with a growing pause of up to two seconds, and the robot's connection begins when it is there. After
 // bus-off the interface comes back by itself only with "ip link set can0 type can restart-ms 100".
-class CanLink {
+class CanLink : public Wire {
  public:
   // The endpoint must outlive the link, and has no other wire. Throws std::invalid_argument for an option out
   // of range and for a convention that does not fit; says which and what to do.
   CanLink(const CanOptions& options, RobotEndpoint& endpoint);
-  ~CanLink();
+  ~CanLink() override;
   CanLink(const CanLink&) = delete;
   CanLink& operator=(const CanLink&) = delete;
 
   CanCounters counters() const;
-  std::uint64_t rounds() const;  // grows at least twice a second while the link is alive
+  std::uint64_t rounds() const override;  // grows at least twice a second while the link is alive
   CanFault fault() const;
   // Why there is no bus, and what to do; empty: there is one.
   std::string problem() const;

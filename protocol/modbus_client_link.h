@@ -51,21 +51,21 @@ struct ModbusClientCounters {
   std::string last_failure;  // empty: none yet
 };
 
-class ModbusClientLink {
+class ModbusClientLink : public Wire {
  public:
   // Connects from here on, in a thread of its own. The endpoint must outlive the link. Throws
   // std::invalid_argument for an option out of range and std::runtime_error when the operating system
   // refuses.
   ModbusClientLink(const ModbusClientOptions& options, RobotEndpoint& endpoint);
   // Withdraws the result first, if the controller still answers.
-  ~ModbusClientLink();
+  ~ModbusClientLink() override;
   ModbusClientLink(const ModbusClientLink&) = delete;
   ModbusClientLink& operator=(const ModbusClientLink&) = delete;
 
   ModbusClientCounters counters() const;
   // Grows before every question to the controller and at least twice a second: a time-out of 5 s is the
   // longest that it can stand still.
-  std::uint64_t rounds() const;
+  std::uint64_t rounds() const override;
 
  private:
   class Loop;

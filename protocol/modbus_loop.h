@@ -8,6 +8,8 @@
 #include <set>
 #include <thread>
 
+#include "protocol/modbus_framing.h"
+#include "protocol/modbus_reply.h"
 #include "protocol/modbus_server.h"
 #include "protocol/modbus_socket.h"
 #include "protocol/modbus_unit.h"

@@ -34,8 +34,8 @@ void check_range(milliseconds value, int lowest, int highest, const char* what) 
 
 const ModbusRtuOptions& checked(const ModbusRtuOptions& options) {
   check(options.line);
-  if (options.unit < 1 || options.unit > 247)
-    throw std::invalid_argument("Modbus RTU: unit must be 1..247, not " + std::to_string(options.unit));
+  if (options.unit.unit < 1 || options.unit.unit > 247)
+    throw std::invalid_argument("Modbus RTU: unit must be 1..247, not " + std::to_string(options.unit.unit));
   check_range(options.answer_within, 10, 10000, "the time for an answer");
   check_range(options.master_timeout, 100, 600000, "the master's time-out");
   check_range(options.gap_tolerance, 0, 100, "the gap tolerance");
@@ -61,19 +61,6 @@ Counter counter_of(RtuProblem problem) {
   return &ModbusRtuCounters::wrong_pdu;
 }
 
-Counter counter_of_exception(std::uint8_t number) {
-  switch (number) {
-    case modbus::illegal_function:
-      return &ModbusRtuCounters::exception_1;
-    case modbus::illegal_data_address:
-      return &ModbusRtuCounters::exception_2;
-    case modbus::illegal_data_value:
-      return &ModbusRtuCounters::exception_3;
-    default:
-      return &ModbusRtuCounters::exception_6;
-  }
-}
-
 }  // namespace
 
 class ModbusRtuServer::Loop {
@@ -96,12 +83,11 @@ class ModbusRtuServer::Loop {
   void serve_frame();
   bool is_late() const;
   std::vector<std::uint8_t> answer(const Adu& request);
-  std::vector<std::uint8_t> take_command(const Adu& request);
-  std::vector<std::uint8_t> exception(const Adu& request, std::uint8_t number);
   void send(const std::vector<std::uint8_t>& answer);
 
   const ModbusRtuOptions options_;
   RobotEndpoint& endpoint_;
+  const ModbusUnitServer unit_;
   mutable std::mutex mutex_;  // guards the next one
   ModbusRtuCounters counters_;
   std::atomic<std::uint64_t> rounds_{0};
@@ -126,8 +112,9 @@ class ModbusRtuServer::Loop {
 ModbusRtuServer::Loop::Loop(const ModbusRtuOptions& options, RobotEndpoint& endpoint)
     : options_(checked(options)),
       endpoint_(endpoint),
+      unit_(options.unit, endpoint),
       wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
-      reader_(options.unit, frame_silence(options.line), options.gap_tolerance),
+      reader_(options.unit.unit, frame_silence(options.line), options.gap_tolerance),
       pause_(options.first_pause) {
   if (!wake_) throw std::runtime_error(std::string("Modbus RTU: eventfd: ") + std::strerror(errno));
   endpoint_.on_change([this] { wake(); });
@@ -254,7 +241,6 @@ void ModbusRtuServer::Loop::serve_frame() {
   const auto frame = reader_.take(Clock::now());
   if (!frame) return;
   if (frame->problem) return count(counter_of(*frame->problem));
-  count(&ModbusRtuCounters::requests);
   pause_ = options_.first_pause;
   last_request_ = Clock::now();
   // A late command is not carried out either.
@@ -275,36 +261,9 @@ void ModbusRtuServer::Loop::send(const std::vector<std::uint8_t>& answer) {
               ": the device takes no answer: " + std::strerror(size < 0 ? errno : EIO));
 }
 
-std::vector<std::uint8_t> ModbusRtuServer::Loop::exception(const Adu& request, std::uint8_t number) {
-  count(counter_of_exception(number));
-  return reply_.exception(request, number);
-}
-
 std::vector<std::uint8_t> ModbusRtuServer::Loop::answer(const Adu& request) {
-  const Ruling ruling = rule(request, true);
-  switch (ruling.kind) {
-    case Ruling::Kind::read:
-      return reply_.registers(request, encode(endpoint_.block(), options_.result_data_id));
-    case Ruling::Kind::command:
-      return take_command(request);
-    case Ruling::Kind::exception:
-      break;
-  }
-  return exception(request, ruling.exception);
-}
-
-std::vector<std::uint8_t> ModbusRtuServer::Loop::take_command(const Adu& request) {
-  const auto command =
-      decode_command(written_registers(request), options_.require_command_crc, options_.command_data_id);
-  if (!command) {
-    count(&ModbusRtuCounters::wrong_command_crc);
-    return exception(request, modbus::illegal_data_value);
-  }
-  const CommandVerdict verdict = endpoint_.command(*command, master_);
-  if (verdict == CommandVerdict::busy) return exception(request, modbus::busy);
-  if (verdict != CommandVerdict::accepted) return exception(request, modbus::illegal_data_value);
-  count(&ModbusRtuCounters::commands);
-  return reply_.written(request);
+  const std::scoped_lock lock(mutex_);
+  return unit_.answer(request, master_, true, reply_, counters_);
 }
 
 ModbusRtuServer::ModbusRtuServer(const ModbusRtuOptions& options, RobotEndpoint& endpoint)

@@ -11,17 +11,14 @@
 #include <memory>
 #include <string>
 
-#include "protocol/robot_endpoint.h"
+#include "protocol/modbus_unit.h"
 #include "protocol/serial_line.h"
 
 namespace zeropose {
 
 struct ModbusRtuOptions {
   SerialLine line;
-  std::uint8_t unit = 1;  // 1..247
-  std::uint16_t result_data_id = default_result_data_id;
-  std::uint16_t command_data_id = default_command_data_id;
-  bool require_command_crc = true;
+  ModbusUnit unit;  // 1..247
   // An answer is never sent later than this after the request's last byte: the master may have asked
   // something else meanwhile. 10..10000.
   std::chrono::milliseconds answer_within{500};
@@ -33,27 +30,26 @@ struct ModbusRtuOptions {
   std::chrono::milliseconds first_pause{100}, longest_pause{2000};
 };
 
-struct ModbusRtuCounters {
+struct ModbusRtuCounters : ModbusUnitCounters {
   std::uint64_t opened = 0, lost = 0, cannot_open = 0, masters_lost = 0;
-  std::uint64_t requests = 0, answers = 0, commands = 0, late = 0, overtaken = 0;
+  std::uint64_t answers = 0, late = 0, overtaken = 0;
   std::uint64_t wrong_length = 0, wrong_crc = 0, broadcasts = 0, other_units = 0, wrong_pdu = 0;
-  std::uint64_t wrong_command_crc = 0, exception_1 = 0, exception_2 = 0, exception_3 = 0, exception_6 = 0;
   bool open = false;         // now
   std::string last_failure;  // of the device; empty: none yet
 };
 
-class ModbusRtuServer {
+class ModbusRtuServer : public Wire {
  public:
   // Serves from here on, in a thread of its own; a device that is not there is waited for. The endpoint must
   // outlive the server. Throws std::invalid_argument for an option out of range and std::runtime_error when
   // the operating system refuses.
   ModbusRtuServer(const ModbusRtuOptions& options, RobotEndpoint& endpoint);
-  ~ModbusRtuServer();
+  ~ModbusRtuServer() override;
   ModbusRtuServer(const ModbusRtuServer&) = delete;
   ModbusRtuServer& operator=(const ModbusRtuServer&) = delete;
 
   ModbusRtuCounters counters() const;
-  std::uint64_t rounds() const;  // grows at least twice a second while the server is alive
+  std::uint64_t rounds() const override;
 
  private:
   class Loop;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "protocol/register_map.h"
+#include "protocol/modbus_unit.h"
 #include "protocol/robot_endpoint.h"
 
 namespace zeropose {
@@ -17,26 +17,16 @@ struct ModbusServerOptions {
   std::chrono::milliseconds frame_time{1000};  // from a request's first byte to its last; to take an answer
 };
 
-// How one robot's blocks are read and written, on TCP and on a serial line.
-struct ModbusUnit {
-  std::uint8_t unit = 1;
-  std::uint16_t result_data_id = default_result_data_id;
-  std::uint16_t command_data_id = default_command_data_id;  // also that of the position block
-  bool require_command_crc = true;
-};
-
 struct ModbusTcpRobot {
   ModbusUnit unit;
   std::vector<std::string> allowed_writers;  // numeric IPv4; empty: everybody who is not a reader
   std::vector<std::string> allowed_readers;  // may read, never write
 };
 
-struct ModbusCounters {
+struct ModbusCounters : ModbusUnitCounters {
   std::uint64_t connections = 0, refused_address = 0, refused_full = 0, evicted = 0, closed_slow = 0,
                 closed_by_peer = 0;
-  std::uint64_t requests = 0, reads = 0, wrong_crc = 0, writes_by_readers = 0;
   std::uint64_t wrong_protocol = 0, wrong_length = 0, wrong_unit = 0, wrong_pdu = 0;  // frames refused
-  std::uint64_t exception_1 = 0, exception_2 = 0, exception_3 = 0, exception_6 = 0;
   std::uint64_t rounds = 0;  // of the loop: grows at least twice a second while the server is alive
   std::size_t clients = 0;   // now
 };

@@ -1,20 +1,23 @@
 #include "protocol/modbus_unit.h"
 
+#include "protocol/modbus_framing.h"
+#include "protocol/modbus_reply.h"
+
 namespace zeropose {
 namespace {
 
-using Counter = std::uint64_t ModbusCounters::*;
+using Counter = std::uint64_t ModbusUnitCounters::*;
 
 Counter counter_of_exception(std::uint8_t number) {
   switch (number) {
     case modbus::illegal_function:
-      return &ModbusCounters::exception_1;
+      return &ModbusUnitCounters::exception_1;
     case modbus::illegal_data_address:
-      return &ModbusCounters::exception_2;
+      return &ModbusUnitCounters::exception_2;
     case modbus::illegal_data_value:
-      return &ModbusCounters::exception_3;
+      return &ModbusUnitCounters::exception_3;
     default:
-      return &ModbusCounters::exception_6;
+      return &ModbusUnitCounters::exception_6;
   }
 }
 
@@ -32,29 +35,33 @@ std::uint8_t exception_of(CommandVerdict verdict) {
 }  // namespace
 
 std::uint8_t ModbusUnitServer::take_command(const Adu& request, ConnectionId from,
-                                            ModbusCounters& counters) const {
+                                            ModbusUnitCounters& counters) const {
   const auto command =
       decode_command(written_registers(request), unit_.require_command_crc, unit_.command_data_id);
   if (!command) {
-    ++counters.wrong_crc;
+    ++counters.wrong_block_crc;
     return modbus::illegal_data_value;
   }
-  return exception_of(endpoint_->command(*command, from));
+  const std::uint8_t exception = exception_of(endpoint_->command(*command, from));
+  if (exception == 0) ++counters.commands;
+  return exception;
 }
 
 std::uint8_t ModbusUnitServer::take_position(const Adu& request, ConnectionId from,
-                                             ModbusCounters& counters) const {
+                                             ModbusUnitCounters& counters) const {
   const auto position =
       decode_position(written_registers(request), unit_.require_command_crc, unit_.command_data_id);
   if (!position) {
-    ++counters.wrong_crc;
+    ++counters.wrong_block_crc;
     return modbus::illegal_data_value;
   }
-  return exception_of(endpoint_->position(*position, from));
+  const std::uint8_t exception = exception_of(endpoint_->position(*position, from));
+  if (exception == 0) ++counters.positions;
+  return exception;
 }
 
 std::vector<std::uint8_t> ModbusUnitServer::answer(const Adu& request, ConnectionId from, bool may_write,
-                                                   ModbusReply& reply, ModbusCounters& counters) const {
+                                                   ModbusReply& reply, ModbusUnitCounters& counters) const {
   ++counters.requests;
   const Ruling ruling = rule(request, may_write);
   std::uint8_t exception = ruling.exception;

@@ -99,7 +99,7 @@ TEST_F(RtuServerTest, RefusalsAreThoseOfTcpAndChangeNothing) {
   after.age_ms = before.age_ms;
   EXPECT_EQ(after, before);
   EXPECT_EQ(server->counters().exception_1, 15u);
-  EXPECT_EQ(server->counters().wrong_command_crc, 1u);
+  EXPECT_EQ(server->counters().wrong_block_crc, 1u);
   recorder.requested(5);
   EXPECT_EQ(line.command({5, 1, 1, 0, 0}), 0);
   EXPECT_EQ(line.command({6, 1, 1, 0, 0}), 6);
@@ -300,8 +300,8 @@ TEST_F(RtuServerTest, OptionsOutOfRangeAreNamed) {
     }
     return "";
   };
-  EXPECT_THAT(refusal([](auto& o) { o.unit = 0; }), HasSubstr("1..247"));
-  EXPECT_THAT(refusal([](auto& o) { o.unit = 248; }), HasSubstr("248"));
+  EXPECT_THAT(refusal([](auto& o) { o.unit.unit = 0; }), HasSubstr("1..247"));
+  EXPECT_THAT(refusal([](auto& o) { o.unit.unit = 248; }), HasSubstr("248"));
   EXPECT_THAT(refusal([](auto& o) { o.line.baud = 1000; }), HasSubstr("baud 1000"));
   EXPECT_THAT(refusal([](auto& o) { o.line.parity = 'M'; }), HasSubstr("N, E or O"));
   EXPECT_THAT(refusal([](auto& o) { o.answer_within = milliseconds(9); }), HasSubstr("10..10000"));

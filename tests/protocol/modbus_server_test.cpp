@@ -80,7 +80,7 @@ TEST_F(LinkTest, RefusalsChangeNothing) {
   EXPECT_EQ(client.ask({23, 0, 0, 0, 61, 3, 232, 0, 1, 2, 0, 1}), (Bytes{0x97, 1}));
   EXPECT_EQ(client.block(), before);
   const ModbusCounters counters = server->counters();
-  EXPECT_EQ(counters.wrong_crc, 1u);
+  EXPECT_EQ(counters.wrong_block_crc, 1u);
   EXPECT_EQ(endpoint->counters().refused_request_id, 2u);
   EXPECT_EQ(counters.exception_1, 4u);
   EXPECT_EQ(counters.exception_3, 4u);
@@ -252,7 +252,7 @@ TEST_F(LinkTest, APositionIsWrittenAsABlockOfItsOwn) {
   publish(ok_report(*request));
   registers[18] ^= 1;
   EXPECT_EQ(client.ask(write_pdu(1100, registers)), (Bytes{0x90, 3}));
-  EXPECT_EQ(server->counters().wrong_crc, 1u);
+  EXPECT_EQ(server->counters().wrong_block_crc, 1u);
   expect_clean_cycle(client, 2);
 }
 

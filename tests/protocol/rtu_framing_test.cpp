@@ -30,7 +30,7 @@ TEST(RtuFraming, ARequestBecomesAnAdu) {
   EXPECT_EQ(frame.request.size, 7u + 26u);
   EXPECT_EQ(frame.request.word(4), 27);
   EXPECT_EQ(rule(frame.request, true).kind, Ruling::Kind::command);
-  EXPECT_EQ(decode_command(command_registers(frame.request)), (Command{7, 1, 2, 3, -4}));
+  EXPECT_EQ(decode_command(written_registers(frame.request)), (Command{7, 1, 2, 3, -4}));
   EXPECT_EQ(encode_rtu(frame.request.view()), rtu_frame(command_pdu({7, 1, 2, 3, -4}), 17));
 }
 
