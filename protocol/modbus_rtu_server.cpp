@@ -254,8 +254,9 @@ void ModbusRtuServer::Loop::send(const std::vector<std::uint8_t>& answer) {
   if (is_late()) return count(&ModbusRtuCounters::late);
   pollfd entry{device_.get(), POLLIN, 0};
   if (poll(&entry, 1, 0) > 0 && (entry.revents & POLLIN) != 0) return count(&ModbusRtuCounters::overtaken);
+  count(&ModbusRtuCounters::answers);  // first: who has the answer finds it counted
   const ssize_t size = write(device_.get(), answer.data(), answer.size());
-  if (size == static_cast<ssize_t>(answer.size())) return count(&ModbusRtuCounters::answers);
+  if (size == static_cast<ssize_t>(answer.size())) return;
   // The rest of an answer, sent later, would look like another one.
   lose_device(options_.line.device +
               ": the device takes no answer: " + std::strerror(size < 0 ? errno : EIO));

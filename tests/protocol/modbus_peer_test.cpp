@@ -2,7 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <future>
+
 #include "tests/support/fake_controller.h"
+#include "tests/support/raw_rtu.h"
 
 namespace zeropose {
 namespace {
@@ -102,6 +105,73 @@ TEST_F(ModbusPeerTest, EveryFaultHasItsNameAndTheNextQuestionIsAnswered) {
   EXPECT_THAT(failure->text, HasSubstr("127.0.0.1 port " + std::to_string(controller.port()) + " unit 1"));
   controller.start();
   expect_clean_question();
+}
+
+// The test is the slave.
+class SerialPeerTest : public testing::Test {
+ protected:
+  SerialPeerTest() : peer({SerialLine{line.device(), 115200, 'N', 1}, 7, milliseconds(200)}) {}
+
+  static Bytes answer_with(std::uint16_t sequence, std::uint8_t unit = 7) {
+    ResultBlock block;
+    block.sequence = sequence;
+    Bytes pdu{4, 122};
+    for (const std::uint16_t value : encode(block)) {
+      pdu.push_back(static_cast<std::uint8_t>(value >> 8));
+      pdu.push_back(static_cast<std::uint8_t>(value & 0xFF));
+    }
+    return rtu_frame(pdu, unit);
+  }
+  BlockAnswer ask(const Bytes& answer) {
+    auto question = std::async(std::launch::async, [this] { return peer.read_block(); });
+    EXPECT_EQ(line.receive_bytes(8), rtu_frame(read_pdu(4, 0, 61), 7));
+    if (!answer.empty()) line.send(answer);
+    return question.get();
+  }
+  void expect_clean_question(std::uint16_t sequence) {
+    ASSERT_FALSE(peer.connect());
+    const BlockAnswer answer = ask(answer_with(sequence));
+    ASSERT_FALSE(answer.failure) << answer.failure->text;
+    EXPECT_EQ(answer.decoded.block.sequence, sequence);
+  }
+
+  RawRtu line;
+  ModbusPeer peer;
+};
+
+TEST_F(SerialPeerTest, WrongAnswersAreNamedAndTheNextIsRight) {
+  expect_clean_question(1);
+  Bytes damaged = answer_with(2);
+  damaged[20] ^= 4;
+  EXPECT_EQ(ask(damaged).failure->problem, PeerProblem::wrong_answer);
+  EXPECT_FALSE(peer.connected());
+  expect_clean_question(3);
+  EXPECT_EQ(ask(answer_with(4, 8)).failure->problem, PeerProblem::wrong_answer);
+  expect_clean_question(5);
+  const BlockAnswer refused = ask(rtu_frame({0x84, 2}, 7));
+  EXPECT_EQ(refused.failure->problem, PeerProblem::refused);
+  EXPECT_EQ(refused.failure->exception, 2);
+  EXPECT_TRUE(peer.connected());
+  expect_clean_question(6);
+}
+
+// On a line an answer names no question: the late one has the right unit, function, length and CRC.
+TEST_F(SerialPeerTest, ALateAnswerIsNotTakenForTheNext) {
+  expect_clean_question(1);
+  EXPECT_EQ(ask({}).failure->problem, PeerProblem::no_answer);
+  auto connecting = std::async(std::launch::async, [this] { return peer.connect(); });
+  line.send(answer_with(2));
+  ASSERT_FALSE(connecting.get());
+  expect_clean_question(3);
+}
+
+TEST_F(SerialPeerTest, ALostDeviceIsNamed) {
+  expect_clean_question(1);
+  line.unplug();
+  EXPECT_EQ(peer.read_block().failure->problem, PeerProblem::connection_lost);
+  EXPECT_EQ(peer.connect()->problem, PeerProblem::cannot_connect);
+  line.plug_in();
+  expect_clean_question(2);
 }
 
 TEST(ModbusPeerOptions, OutOfRangeAreNamed) {

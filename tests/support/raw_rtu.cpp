@@ -98,6 +98,11 @@ Bytes RawRtu::receive(std::chrono::milliseconds patience) {
   return receive_exactly(bytes, size, deadline) ? bytes : Bytes{};
 }
 
+Bytes RawRtu::receive_bytes(std::size_t count, std::chrono::milliseconds patience) {
+  Bytes bytes;
+  return receive_exactly(bytes, count, Clock::now() + patience) ? bytes : Bytes{};
+}
+
 Bytes RawRtu::ask(const Bytes& pdu, std::uint8_t unit) {
   send(rtu_frame(pdu, unit));
   const Bytes answer = receive();

@@ -24,6 +24,9 @@ class RawRtu {
   void send(const Bytes& bytes);
   // Unit, PDU and CRC; as much as belongs to an answer to `function`. Empty: nothing for `patience`.
   Bytes receive(std::chrono::milliseconds patience = std::chrono::milliseconds(2000));
+  // For the other role: exactly so many bytes, or none.
+  Bytes receive_bytes(std::size_t count,
+                      std::chrono::milliseconds patience = std::chrono::milliseconds(2000));
   bool nothing_to_read() const;
   // send() and receive(); the PDU of the answer, empty when there is none or its CRC or unit is wrong.
   Bytes ask(const Bytes& pdu, std::uint8_t unit = 1);
