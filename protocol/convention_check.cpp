@@ -81,8 +81,10 @@ std::vector<Convention> classes(std::size_t count) {
 
 std::string names_of(const std::vector<Convention>& conventions) {
   std::string text;
-  for (const Convention convention : conventions)
-    text += (text.empty() ? "" : ", ") + std::string(name_of(convention));
+  for (const Convention convention : conventions) {
+    if (!text.empty()) text += ", ";
+    text += name_of(convention);
+  }
   return text;
 }
 
@@ -139,7 +141,7 @@ std::vector<Cause> other_signs(const ConventionCheck& check) {
     for (unsigned flips = 1; flips < 8; ++flips) {
       std::string text;
       for (std::size_t i = 0; i < 3; ++i)
-        if (flips >> i & 1) text += " " + std::string(names[first + i]);
+        if (flips >> i & 1) text.append(" ").append(names[first + i]);
       const auto flip = [=](Values values) {
         for (std::size_t i = 0; i < 3; ++i)
           if (flips >> i & 1) values[first + i] *= -1;
@@ -188,7 +190,7 @@ std::string text_of_failure(const ConventionVerdict& verdict) {
            "to "
            "the same place on it each time? Is its tool measured in?";
   std::string text = "NOT PROVEN. What would explain all that was seen:";
-  for (const std::string& one : verdict.explanations) text += "\n  " + one;
+  for (const std::string& one : verdict.explanations) text.append("\n  ").append(one);
   return text;
 }
 
