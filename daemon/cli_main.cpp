@@ -4,6 +4,7 @@
 #include "daemon/cli_batch.h"
 #include "daemon/cli_cameras.h"
 #include "daemon/cli_live.h"
+#include "daemon/cli_robot.h"
 #include "daemon/version.h"
 
 int main(int argc, char** argv) {
@@ -14,6 +15,7 @@ int main(int argc, char** argv) {
   zeropose::add_live_verbs(app, exit_status);
   zeropose::add_batch_verbs(app, exit_status);
   zeropose::add_cameras(app, exit_status);
+  zeropose::add_robot(app, exit_status);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
