@@ -119,7 +119,7 @@ int run(const std::vector<std::string>& arguments) {
   if (arguments.size() == 3 && arguments[0] == "rtu") {
     ModbusRtuOptions options;
     options.line = {arguments[1], 19200, 'N', 1};
-    options.unit = static_cast<std::uint8_t>(std::stoi(arguments[2]));
+    options.unit.unit = static_cast<std::uint8_t>(std::stoi(arguments[2]));
     options.first_pause = milliseconds(20);
     options.longest_pause = milliseconds(100);
     return serve<ModbusRtuServer>(options);
