@@ -66,7 +66,7 @@ bool pdu_is_whole(const Adu& adu) {
       return byte_count >= 2 && byte_count == 2 * std::size_t{adu.quantity()} && pdu == 6 + byte_count;
     }
     default:
-      return true;
+      return adu.function() < 0x80;  // above are answers: an exception to one would look like a good answer
   }
 }
 

@@ -47,7 +47,7 @@ struct Adu {
 };
 
 // The length fits the function. Other functions than FC03, FC04 and FC16 are answered with an exception,
-// whatever follows them in the frame.
+// whatever follows them in the frame; what is no function at all (128..255) is not answered.
 bool pdu_is_whole(const Adu& adu);
 
 using UnitSet = std::bitset<256>;  // unit ids
