@@ -250,7 +250,15 @@ def check_garbage(robot, server):
 
 
 def check_full_load(robot, server):
-    """Under a flood that the node has to look at, nothing of it counts, and afterwards a cycle is clean."""
+    """A cycle is clean on a full bus. Under a flood that the node has to look at nothing of it counts, and afterwards a
+    cycle is clean."""
+    robot.bus.set_filters([{"can_id": base + NODE, "can_mask": 0x7FF} for base in (0x080, 0x180, 0x280, 0x380, 0x580)])
+    with subprocess.Popen(["cangen", robot.interface, "-g", "0", "-i", "-I", "111", "-L", "8"]) as flood:
+        for _ in range(3):
+            robot.clean_cycle()
+        assert flood.poll() is None, "the flood ended before the cycles"
+        flood.terminate()
+    robot.bus.set_filters(None)
     before = server.counters()
     with subprocess.Popen(["cangen", robot.interface, "-g", "0", "-i", "-I", "605", "-L", "5"]) as flood:
         time.sleep(3)
