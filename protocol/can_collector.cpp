@@ -31,7 +31,7 @@ std::optional<CanResult> CanResultCollector::commit(const CanFrame& frame, TimeP
   if (!lengths || !angles || now - lengths->at > can_result_window) return std::nullopt;
   const std::array<CanFrame, 3> frames = {lengths->frame, angles->frame, frame};
   const auto result = decode_can_result(frames, epoch_, coding_);
-  if (!result || result->request_id != *outstanding_ || result->has(can_status::busy)) return std::nullopt;
+  if (!result || outstanding_ != result->request_id || result->has(can_status::busy)) return std::nullopt;
   outstanding_.reset();
   return result;
 }

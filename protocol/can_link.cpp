@@ -49,9 +49,9 @@ class CanLink::Loop {
   void wait(TimePoint now);
   void open(TimePoint now);
   void close(TimePoint now);
-  void receive(TimePoint now);
+  void receive(CanSocket& socket, TimePoint now);
   void handle(const CanReceived& received);
-  void send();
+  void send(CanSocket& socket);
   void lose_owner();
   void tell();
 
@@ -111,11 +111,11 @@ void CanLink::Loop::round() {
   if (!socket_ && begin >= open_again_at_) open(begin);
   wait(begin);
   const TimePoint now = Clock::now();
-  if (socket_) receive(now);
+  if (socket_) receive(*socket_, now);
   endpoint_.tick();
   node_.tick(now);
   node_.show(endpoint_.block());
-  if (socket_) send();
+  if (socket_) send(*socket_);
   ++rounds_;
   tell();
 }
@@ -157,10 +157,10 @@ void CanLink::Loop::close(TimePoint now) {
   lose_owner();
 }
 
-void CanLink::Loop::receive(TimePoint now) {
+void CanLink::Loop::receive(CanSocket& socket, TimePoint now) {
   CanReceived received;
   for (int i = 0; i < frames_per_round; ++i) {
-    const CanIo io = socket_->receive(received);
+    const CanIo io = socket.receive(received);
     if (io == CanIo::interface_gone) return close(now);
     if (io != CanIo::done) return;
     handle(received);
@@ -175,9 +175,9 @@ void CanLink::Loop::handle(const CanReceived& received) {
   if (taken.link_lost) lose_owner();
 }
 
-void CanLink::Loop::send() {
+void CanLink::Loop::send(CanSocket& socket) {
   while (const auto frame = node_.next_frame(Clock::now())) {
-    const CanIo io = socket_->send(*frame);
+    const CanIo io = socket.send(*frame);
     if (io == CanIo::done) continue;
     if (io == CanIo::interface_gone) return close(Clock::now());
     return node_.failed_to_write(Clock::now());

@@ -117,8 +117,6 @@ CanTaken CanNode::take(const CanFrame& frame, bool own_echo, TimePoint now) {
 }
 
 void CanNode::take_echo(const CanFrame& frame) {
-  // Somebody takes our frames again: what was given up is made anew.
-  if (stalled_) sent_.reset();
   stalled_ = false;
   if (!under_way_ || !(under_way_->frame == frame)) {
     ++counters_.late_echoes;
