@@ -171,7 +171,38 @@ PLC = Program(
 ALL = {"KUKA": KUKA, "FANUC": FANUC, "ABB": ABB, "Universal Robots": UNIVERSAL, "PLC": PLC}
 
 
+def words(*pairs):
+    return tuple((rf"\b{opens}\b", rf"\b{closes}\b") for opens, closes in pairs)
+
+
+# What opens a block and what closes it, without comments and texts; and how long a name may be.
+FORMS = {
+    "zeropose.src": (r";.*", 24, words(("IF", "ENDIF"), ("FOR", "ENDFOR"), ("REPEAT", "UNTIL"), ("DEFFCT", "ENDFCT"),
+                                       ("DEF", "END"))),
+    "zeropose.kl": (r"--.*|'.*'", 12, words(("IF", "ENDIF"), ("FOR", "ENDFOR"), ("WHILE", "ENDWHILE"),
+                                            ("REPEAT", "UNTIL"), ("(?:ROUTINE|PROGRAM)", "END"))),
+    "zeropose.mod": (r"!.*|\".*\"", 32, words(("THEN", "ENDIF"), ("FOR", "ENDFOR"), ("WHILE", "ENDWHILE"),
+                                              ("FUNC", "ENDFUNC"), ("PROC", "ENDPROC"))),
+    "zeropose.script": (r"#.*|\".*?\"", 40, ((r"(?m)^ *(?:def|thread|while|if)\b.*:$", r"(?m)^ *end$"),)),
+    "zeropose.st": (r"(?s)\(\*.*?\*\)", 32, words(("IF", "END_IF"), ("FOR", "END_FOR"), ("FUNCTION", "END_FUNCTION"),
+                                                  ("FUNCTION_BLOCK", "END_FUNCTION_BLOCK"), ("TYPE", "END_TYPE"),
+                                                  ("VAR(?:_INPUT|_OUTPUT)?", "END_VAR"), ("STRUCT", "END_STRUCT"))),
+}
+
+
 class RobotPrograms(unittest.TestCase):
+    def test_every_block_is_closed_and_no_name_is_too_long(self):
+        for name, (comment, longest, pairs) in FORMS.items():
+            text = re.sub(comment, "", (PROGRAMS / name).read_text())
+            text = "\n".join(line.rstrip() for line in text.splitlines())
+            for opens, closes in pairs:
+                with self.subTest(program=name, block=opens):
+                    self.assertGreater(len(re.findall(opens, text)), 0)
+                    self.assertEqual(len(re.findall(opens, text)), len(re.findall(closes, text)))
+            for opens, closes in ("()", "[]", "{}"):
+                self.assertEqual(text.count(opens), text.count(closes), f"{name} {opens}{closes}")
+            self.assertEqual([word for word in re.findall(r"\b[A-Za-z]\w*", text) if len(word) > longest], [], name)
+
     def test_every_check_uses_the_daemons_registers_and_numbers(self):
         for name, program in ALL.items():
             text = program.text()
