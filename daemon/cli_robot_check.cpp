@@ -33,7 +33,8 @@ robot finds the same place on the object by itself (three-point method, or touch
 shows is typed in, in the controller's own numbers. A correction read back from the controller proves nothing: in a
 wrong order the same numbers are read back.
 --robot-went FILE: eight lines of numbers instead (zero first, then the shifts in order; # comments).
---simulated SOCKET: the simulated cell moves the object (zeropose-cell --control SOCKET), and back to its zero at the end.
+--simulated SOCKET: the simulated cell moves the object (zeropose-cell --control SOCKET), and back to its
+zero at the end.
 --socket SOCKET: the daemon measures each place, and what was measured counts; it shows the correction that the robot
 would get. The job's limits must allow the turns.
 Examples:

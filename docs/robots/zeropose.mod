@@ -1,6 +1,6 @@
 MODULE zeropose
   ! Asks for a correction and takes it only when every check passes.
-  ! NOT RUN ON A CONTROLLER. Written from the register map of docs/modbus.md and public descriptions of RAPID; a
+  ! NOT RUN ON A CONTROLLER. Written from the register map of docs/modbus.md and general knowledge of RAPID, not compared with its manual; a
   ! test compares its constants with the daemon's register map. No compiler has seen it.
   ! These checks are process checks, not a safety function.
   !

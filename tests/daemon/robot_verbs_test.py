@@ -292,7 +292,7 @@ class ConventionTest(Case):
 
         def daemon(question):
             self.assertEqual(question, {"cmd": "measure"})
-            near = [value + (2 if i == 0 else 0) for i, value in enumerate(place["pose"])]  # 2 mm from where it was asked
+            near = [value + (2 if i == 0 else 0) for i, value in enumerate(place["pose"])]  # 2 mm off
             return {"status": "ok", "X_O0O": near, "X_WO": near}
 
         shifted = [kuka([six[0] + 2] + six[1:]) for six in SHIFTS]

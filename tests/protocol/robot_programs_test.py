@@ -142,12 +142,14 @@ UNIVERSAL = Program(
      "sequence": "{sequence_begin}!={sequence_end}", "CRC": "zp_crc_high()!={crc} or zp_crc_low()!=zp_r[59]",
      "CRC's extent": "while i<58:", "epoch": "{epoch}!=zp_epoch_high or zp_r[4]!=zp_epoch_low",
      "epoch is remembered": "zp_epoch_high={epoch}", "own request id": "{long_request_id}!=zp_id",
-     "single use": "zp_id==zp_used", "job": "{job}!=job", "robot": "{robot_index}!=zp_robot", "part": "{long_part}!=part",
-     "convention": "{convention}!=zp_convention", "its convention": "zp_convention={is_universal_robots}#",
+     "single use": "zp_id==zp_used", "job": "{job}!=job", "robot": "{robot_index}!=zp_robot",
+     "part": "{long_part}!=part", "convention": "{convention}!=zp_convention",
+     "its convention": "zp_convention={is_universal_robots}#",
      "frame": "{frame}!=zp_frame", "status": "{status}!={good} and {status}!={good_simulated}",
      "not ok": "{status}%32>={not_ok}", "busy": "{status}%4>={busy}", "code": "{code}!=0",
      "state": "{state}!={state_ready}", "age": "{age}+zp_since(zp_asked)>={validity}", "validity": "{validity}==0",
-     "values": "p[{long_values}/1000000.0", "no value": "zp_r[i]==32768 and zp_r[i+1]==0", "first value": "local i={at_values} while",
+     "values": "p[{long_values}/1000000.0", "no value": "zp_r[i]==32768 and zp_r[i+1]==0",
+     "first value": "local i={at_values} while",
      "own limits": ">zp_max_m:", "result id": "zp_result_id={result_id}#", "command id": "zp_command_id={command_id}#",
      "where commands go": "zp_put({first_command})", "Acknowledge": "zp_send(2,0,0,0)",
      "time-out": "zp_since(zp_commanded)>zp_patience"})
@@ -163,15 +165,48 @@ PLC = Program(
      "frame": "{frame}<>Settings.Frame", "status": "({status} AND 16#{mask:04X})<>16#{good:04X}",
      "not ok": "({status} AND 16#{not_ok:04X})<>16#0000", "busy": "({status} AND 16#{busy:04X})<>16#0000",
      "code": "{code}<>16#0000", "state": "{state}<>16#{state_ready:04X}",
-     "age": "WORD_TO_DWORD({age})))+SinceRead", "validity": "Validity:=DINT_TO_TIME(DWORD_TO_DINT(WORD_TO_DWORD({validity})))",
-     "values": "High:=Registers[{at_values}+2*I]", "no value": "(Raw=16#80000000)<>", "own limits": ">Settings.Limits[I]",
+     "age": "WORD_TO_DWORD({age})))+SinceRead",
+     "validity": "Validity:=DINT_TO_TIME(DWORD_TO_DINT(WORD_TO_DWORD({validity})))",
+     "values": "High:=Registers[{at_values}+2*I]", "no value": "(Raw=16#80000000)<>",
+     "own limits": ">Settings.Limits[I]",
      "result id": "ResultId:WORD:=16#{result_id:04X};", "command id": "CommandId:WORD:=16#{command_id:04X};",
      "Acknowledge": "Command[2]:=16#0002", "time-out": "SinceCommand.ET>Settings.Patience"})
 
 ALL = {"KUKA": KUKA, "FANUC": FANUC, "ABB": ABB, "Universal Robots": UNIVERSAL, "PLC": PLC}
 
 
+def words(*pairs):
+    return tuple((rf"\b{opens}\b", rf"\b{closes}\b") for opens, closes in pairs)
+
+
+# What opens a block and what closes it, without comments and texts; and how long a name may be.
+FORMS = {
+    "zeropose.src": (r";.*", 24, words(("IF", "ENDIF"), ("FOR", "ENDFOR"), ("REPEAT", "UNTIL"), ("DEFFCT", "ENDFCT"),
+                                       ("DEF", "END"))),
+    "zeropose.kl": (r"--.*|'.*'", 12, words(("IF", "ENDIF"), ("FOR", "ENDFOR"), ("WHILE", "ENDWHILE"),
+                                            ("REPEAT", "UNTIL"), ("(?:ROUTINE|PROGRAM)", "END"))),
+    "zeropose.mod": (r"!.*|\".*\"", 32, words(("THEN", "ENDIF"), ("FOR", "ENDFOR"), ("WHILE", "ENDWHILE"),
+                                              ("FUNC", "ENDFUNC"), ("PROC", "ENDPROC"))),
+    "zeropose.script": (r"#.*|\".*?\"", 40, ((r"(?m)^ *(?:def|thread|while|if)\b.*:$", r"(?m)^ *end$"),)),
+    "zeropose.st": (r"(?s)\(\*.*?\*\)", 32, words(("IF", "END_IF"), ("FOR", "END_FOR"), ("FUNCTION", "END_FUNCTION"),
+                                                  ("FUNCTION_BLOCK", "END_FUNCTION_BLOCK"), ("TYPE", "END_TYPE"),
+                                                  ("VAR(?:_INPUT|_OUTPUT)?", "END_VAR"), ("STRUCT", "END_STRUCT"))),
+}
+
+
 class RobotPrograms(unittest.TestCase):
+    def test_every_block_is_closed_and_no_name_is_too_long(self):
+        for name, (comment, longest, pairs) in FORMS.items():
+            text = re.sub(comment, "", (PROGRAMS / name).read_text())
+            text = "\n".join(line.rstrip() for line in text.splitlines())
+            for opens, closes in pairs:
+                with self.subTest(program=name, block=opens):
+                    self.assertGreater(len(re.findall(opens, text)), 0)
+                    self.assertEqual(len(re.findall(opens, text)), len(re.findall(closes, text)))
+            for opens, closes in ("()", "[]", "{}"):
+                self.assertEqual(text.count(opens), text.count(closes), f"{name} {opens}{closes}")
+            self.assertEqual([word for word in re.findall(r"\b[A-Za-z]\w*", text) if len(word) > longest], [], name)
+
     def test_every_check_uses_the_daemons_registers_and_numbers(self):
         for name, program in ALL.items():
             text = program.text()
