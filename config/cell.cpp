@@ -11,6 +11,7 @@
 #include "config/files.h"
 #include "config/ipv4.h"
 #include "config/json_reader.h"
+#include "config/robot_link.h"
 #include "config/text.h"
 
 namespace zeropose {
@@ -23,17 +24,8 @@ constexpr std::array<std::string_view, 10> mark_kind_names{
     "bright_ball", "dark_slot",   "bright_slot", "dark_cross",  "bright_cross"};
 constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring, MarkKind::ball, MarkKind::slot,
                                 MarkKind::cross};
-constexpr std::array<std::string_view, 1> link_names{"modbus-tcp"};
 constexpr std::array<std::string_view, 4> frame_names{"object_zero", "world_shift", "robot_base_shift",
                                                       "user_frame"};
-
-void read_addresses(JsonObject& object, std::string_view key, std::vector<std::string>& addresses) {
-  if (!object.read_optional(key, addresses)) return;
-  for (std::size_t i = 0; i < addresses.size(); ++i)
-    if (!is_ipv4(addresses[i]))
-      object.add_mistake(path_of(std::string(key), i), in_quotes(addresses[i]),
-                         "an IPv4 address such as 192.168.10.11");
-}
 
 void read_milliseconds(JsonObject& object, std::string_view key, std::chrono::milliseconds& value, int min,
                        int max) {
@@ -212,15 +204,6 @@ void read_references(JsonObject& object, Cell& cell) {
                        [&](JsonObject& member) { read_reference_check(member, cell.references); });
 }
 
-void read_link(JsonObject& object, RobotOptions& robot) {
-  std::size_t type = 0;
-  int port = 0, unit = robot.unit;
-  object.read_word("type", link_names, type);
-  read_address(object, "address", robot.address);
-  if (object.read("port", port, 1, 65535)) robot.port = static_cast<std::uint16_t>(port);
-  if (object.read_optional("unit", unit, 0, 255)) robot.unit = static_cast<std::uint8_t>(unit);
-}
-
 LinearAxis read_axis(JsonObject& object) {
   LinearAxis axis;
   Eigen::Vector3d given;
@@ -239,11 +222,8 @@ std::vector<std::string_view> wire_convention_names() {
 
 RobotOptions read_robot(JsonObject& object) {
   RobotOptions robot;
-  // Not the defaults: check_cell leaves out what could not be read.
-  robot.address.clear();
-  robot.port = 0;
   object.read("name", robot.name);
-  object.read("link", [&](JsonObject& link) { read_link(link, robot); });
+  robot.link = read_link_options(object);
   const std::vector<std::string_view> conventions = wire_convention_names();
   std::size_t index = 0;
   if (object.read_word("convention", conventions, index))
@@ -252,9 +232,6 @@ RobotOptions read_robot(JsonObject& object) {
   object.read("pose_in_world", robot.X_WR);
   object.read_optional("axis", [&](JsonObject& axis) { robot.axis = read_axis(axis); });
   read_milliseconds(object, "validity_ms", robot.validity, 50, 65535);
-  object.read_optional("require_command_crc", robot.require_command_crc);
-  read_addresses(object, "allowed_writers", robot.allowed_writers);
-  read_addresses(object, "allowed_readers", robot.allowed_readers);
   return robot;
 }
 

@@ -15,24 +15,18 @@
 #include "measure/correction.h"
 #include "measure/job.h"
 #include "measure/references.h"
-#include "protocol/conventions.h"
+#include "protocol/link_options.h"
 
 namespace zeropose {
 
 struct RobotOptions {
   std::string name;
-  std::string address = "127.0.0.1";  // where the Modbus TCP server listens for this robot
-  std::uint16_t port = 1502;
-  std::uint8_t unit = 1;
+  LinkOptions link;
   Convention convention = Convention::generic;
   CorrectionFrame frame = CorrectionFrame::object_zero;
   Pose X_WR = Pose::Identity();    // on an axis: where the base was taught
   std::optional<LinearAxis> axis;  // that the base rides on; its position comes with Measure
   std::chrono::milliseconds validity{2000};
-  bool require_command_crc = true;
-  std::vector<std::string> allowed_writers;  // addresses; empty: any
-  std::vector<std::string>
-      allowed_readers;  // addresses that may read but never write; empty: none beside the writers
 };
 
 struct Cell {

@@ -103,41 +103,76 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
 
 // Robots of one address and port have a unit id each. Two servers cannot listen on one port; 0.0.0.0 takes
 // the port of every address.
-void check_ports(const std::vector<RobotOptions>& robots, JsonReading& reading) {
+void check_ports(const ModbusTcpOptions& tcp, const ModbusTcpOptions& other, const std::string& path,
+                 const std::string& other_path, JsonReading& reading) {
   const std::string every = "0.0.0.0";
+  if (tcp.port == 0 || tcp.address.empty() || other.address.empty() || tcp.port != other.port) return;
+  const std::string place = tcp.address + ":" + std::to_string(tcp.port);
+  const std::string as_in = ", as in " + other_path;
+  if (tcp.address != other.address) {
+    if (tcp.address == every || other.address == every)
+      reading.add_mistake(path + ".port", place + as_in, "a port of its own for each address");
+  } else if (tcp.robot.unit.unit == other.robot.unit.unit) {
+    reading.add_mistake(path + ".unit", place + " unit " + std::to_string(tcp.robot.unit.unit) + as_in,
+                        "a port or a unit id of its own for each robot");
+  }
+}
+
+void check_places(const ModbusRtuOptions& rtu, const ModbusRtuOptions& other, const std::string& path,
+                  const std::string& other_path, JsonReading& reading) {
+  if (!rtu.line.device.empty() && rtu.line.device == other.line.device)
+    reading.add_mistake(path + ".device", in_quotes(rtu.line.device) + ", as in " + other_path,
+                        "a serial line of its own for each robot");
+}
+
+void check_places(const CanOptions& can, const CanOptions& other, const std::string& path,
+                  const std::string& other_path, JsonReading& reading) {
+  if (can.interface == other.interface && can.node == other.node)
+    reading.add_mistake(path + ".node",
+                        can.interface + " node " + std::to_string(can.node) + ", as in " + other_path,
+                        "a node of its own for each robot");
+}
+
+void check_places(const ModbusTcpOptions& tcp, const ModbusTcpOptions& other, const std::string& path,
+                  const std::string& other_path, JsonReading& reading) {
+  check_ports(tcp, other, path, other_path, reading);
+}
+
+void check_places(const ModbusClientOptions&, const ModbusClientOptions&, const std::string&,
+                  const std::string&, JsonReading&) {}
+
+// No two robots in one place.
+void check_places(const std::vector<RobotOptions>& robots, JsonReading& reading) {
   for (std::size_t i = 0; i < robots.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j) {
-      if (robots[i].port == 0 || robots[i].address.empty() || robots[j].address.empty()) continue;
-      const bool overlap =
-          robots[i].address == robots[j].address || robots[i].address == every || robots[j].address == every;
-      if (!overlap || robots[i].port != robots[j].port) continue;
-      const std::string place = robots[i].address + ":" + std::to_string(robots[i].port);
-      const std::string other = ", as in " + path_of("robots", j) + ".link";
-      if (robots[i].address != robots[j].address)
-        reading.add_mistake(path_of("robots", i) + ".link.port", place + other,
-                            "a port of its own for each address");
-      else if (robots[i].unit == robots[j].unit)
-        reading.add_mistake(path_of("robots", i) + ".link.unit",
-                            place + " unit " + std::to_string(robots[i].unit) + other,
-                            "a port or a unit id of its own for each robot");
-      else
-        continue;
-      break;
-    }
+    for (std::size_t j = 0; j < i; ++j)
+      std::visit(
+          [&]<class Link>(const Link& link) {
+            if (const auto* other = std::get_if<Link>(&robots[j].link))
+              check_places(link, *other, path_of("robots", i) + ".link", path_of("robots", j) + ".link",
+                           reading);
+          },
+          robots[i].link);
+}
+
+void check_lists(const ModbusTcpRobot& robot, const std::string& path, JsonReading& reading) {
+  const std::set<std::string> writers(robot.allowed_writers.begin(), robot.allowed_writers.end());
+  for (std::size_t j = 0; j < robot.allowed_readers.size(); ++j)
+    if (writers.contains(robot.allowed_readers[j]))
+      reading.add_mistake(path_of(path + ".allowed_readers", j),
+                          in_quotes(robot.allowed_readers[j]) + ", as in allowed_writers",
+                          "each address in one of the two lists");
 }
 
 void check_robots(const Cell& cell, JsonReading& reading) {
   check_unique(cell.robots, "robots", "name", name_in_quotes, reading);
-  check_ports(cell.robots, reading);
+  check_places(cell.robots, reading);
   for (std::size_t i = 0; i < cell.robots.size(); ++i) {
     const RobotOptions& robot = cell.robots[i];
     const std::string path = path_of("robots", i);
-    const std::set<std::string> writers(robot.allowed_writers.begin(), robot.allowed_writers.end());
-    for (std::size_t j = 0; j < robot.allowed_readers.size(); ++j)
-      if (writers.contains(robot.allowed_readers[j]))
-        reading.add_mistake(path_of(path + ".allowed_readers", j),
-                            in_quotes(robot.allowed_readers[j]) + ", as in allowed_writers",
-                            "each address in one of the two lists");
+    if (const auto* tcp = std::get_if<ModbusTcpOptions>(&robot.link)) check_lists(tcp->robot, path, reading);
+    if (std::holds_alternative<CanOptions>(robot.link) && !fits_can(robot.convention))
+      reading.add_mistake(path + ".convention", in_quotes(std::string(name_of(robot.convention))),
+                          "a convention with three lengths and three angles for a link of type can");
   }
 }
 

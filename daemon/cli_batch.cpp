@@ -40,8 +40,8 @@ std::string summary_of(const Cell& cell) {
     text << "  job " << job.number << " " << job.name << ": " << job.marks.size() << " marks, "
          << job.views.size() << " views\n";
   for (const RobotOptions& robot : cell.robots)
-    text << "  robot " << robot.name << ": " << name_of(robot.convention) << ", Modbus TCP " << robot.address
-         << ":" << robot.port << " unit " << int{robot.unit} << "\n";
+    text << "  robot " << robot.name << ": " << name_of(robot.convention) << ", " << describe(robot.link)
+         << "\n";
   text << "  hashes: config " << hash_text(cell.config_hash) << ", calibration "
        << hash_text(cell.calibration_hash) << "\n";
   return text.str();

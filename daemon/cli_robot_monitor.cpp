@@ -50,8 +50,12 @@ ModbusPeerOptions peer_of(const MonitorOptions& options) {
   ModbusPeerOptions peer;
   if (!options.cell.empty()) {
     const RobotOptions robot = robot_of_cell(options.cell, options.robot);
-    where = {robot.address == "0.0.0.0" ? "127.0.0.1" : robot.address, robot.port};
-    peer.unit = robot.unit;
+    const auto* tcp = std::get_if<ModbusTcpOptions>(&robot.link);
+    if (tcp == nullptr)
+      throw std::invalid_argument("robot " + robot.name + " is reached by " + describe(robot.link) +
+                                  "; only links of type modbus-tcp can be monitored");
+    where = {tcp->address == "0.0.0.0" ? "127.0.0.1" : tcp->address, tcp->port};
+    peer.unit = tcp->robot.unit.unit;
   } else if (options.address.empty() && options.port == 0) {
     throw std::invalid_argument("which robot? Give --cell and --robot, or --address, --port and --unit");
   }

@@ -4,31 +4,37 @@
 
 #include <map>
 
-#include "protocol/modbus_server.h"
+#include "protocol/can_link.h"
 
 namespace zeropose {
 namespace {
 
-ModbusTcpRobot tcp_robot(const RobotOptions& robot) {
-  ModbusTcpRobot served;
-  served.unit.unit = robot.unit;
-  served.unit.require_command_crc = robot.require_command_crc;
-  served.allowed_writers = robot.allowed_writers;
-  served.allowed_readers = robot.allowed_readers;
-  return served;
+using Wires = std::vector<std::unique_ptr<Wire>>;
+using Servers = std::map<std::pair<std::string, std::uint16_t>, std::vector<ModbusTcpServer::Served>>;
+
+void open(const ModbusTcpOptions& tcp, RobotEndpoint& endpoint, Wires&, Servers& servers) {
+  servers[{tcp.address, tcp.port}].push_back({tcp.robot, endpoint});
+}
+void open(const ModbusRtuOptions& rtu, RobotEndpoint& endpoint, Wires& wires, Servers&) {
+  wires.push_back(std::make_unique<ModbusRtuServer>(rtu, endpoint));
+}
+void open(const ModbusClientOptions& client, RobotEndpoint& endpoint, Wires& wires, Servers&) {
+  wires.push_back(std::make_unique<ModbusClientLink>(client, endpoint));
+}
+void open(const CanOptions& can, RobotEndpoint& endpoint, Wires& wires, Servers&) {
+  wires.push_back(std::make_unique<CanLink>(can, endpoint));
 }
 
 }  // namespace
 
-std::vector<std::unique_ptr<Wire>> open_wires(const std::vector<RobotOptions>& robots,
-                                              const std::vector<std::unique_ptr<RobotEndpoint>>& endpoints) {
-  std::map<std::pair<std::string, std::uint16_t>, std::vector<ModbusTcpServer::Served>> servers;
+Wires open_wires(const std::vector<RobotOptions>& robots,
+                 const std::vector<std::unique_ptr<RobotEndpoint>>& endpoints) {
+  Wires wires;
+  Servers servers;
   for (std::size_t i = 0; i < robots.size(); ++i) {
-    const RobotOptions& robot = robots[i];
-    servers[{robot.address, robot.port}].push_back({tcp_robot(robot), *endpoints[i]});
-    spdlog::info("{}: Modbus TCP on {}:{}, unit {}", robot.name, robot.address, robot.port, robot.unit);
+    std::visit([&](const auto& link) { open(link, *endpoints[i], wires, servers); }, robots[i].link);
+    spdlog::info("{}: {}", robots[i].name, describe(robots[i].link));
   }
-  std::vector<std::unique_ptr<Wire>> wires;
   for (const auto& [place, served] : servers) {
     ModbusServerOptions options;
     options.address = place.first;

@@ -17,9 +17,10 @@ using Clock = std::chrono::steady_clock;
 SimulatedRobotOptions robot_options(const Cell& cell) {
   const RobotOptions& robot = cell.robots.front();
   SimulatedRobotOptions options;
-  options.address = robot.address;
-  options.port = robot.port;
-  options.unit = robot.unit;
+  const auto& tcp = std::get<ModbusTcpOptions>(robot.link);
+  options.address = tcp.address;
+  options.port = tcp.port;
+  options.unit = tcp.robot.unit.unit;
   options.convention = robot.convention;
   options.frame = static_cast<std::uint16_t>(robot.frame);
   options.first_request_id = std::random_device{}() | 1U;  // a robot that starts anew must not repeat its ids

@@ -25,10 +25,11 @@ TEST(Cell, LoadsTheExample) {
   ASSERT_EQ(cell.calibration.size(), 4U);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(cell.calibration[i].name, cell.cameras[i].name);
   ASSERT_EQ(cell.robots.size(), 1U);
-  EXPECT_EQ(cell.robots[0].port, 1502);
+  const auto& link = std::get<ModbusTcpOptions>(cell.robots[0].link);
+  EXPECT_EQ(link.port, 1502);
   EXPECT_EQ(cell.robots[0].convention, Convention::kuka);
   EXPECT_EQ(cell.robots[0].frame, CorrectionFrame::robot_base_shift);
-  EXPECT_TRUE(cell.robots[0].require_command_crc);
+  EXPECT_TRUE(link.robot.unit.require_command_crc);
   EXPECT_NEAR(to_six_numbers(cell.robots[0].X_WR).rz_deg, 90, 1e-12);
   EXPECT_EQ(cell.deadline.count(), 500);
   EXPECT_EQ(cell.zero_frames, 10);
@@ -131,9 +132,10 @@ TEST(Cell, ReadsTheOptionalKeys) {
   ASSERT_TRUE(cell.robots[0].axis);
   EXPECT_EQ(cell.robots[0].axis->direction_W, Eigen::Vector3d::UnitY());
   EXPECT_EQ(cell.robots[0].axis->zero_mm, -250.5);
-  EXPECT_FALSE(cell.robots[0].require_command_crc);
-  EXPECT_THAT(cell.robots[0].allowed_writers, ElementsAre("10.0.0.1"));
-  EXPECT_THAT(cell.robots[0].allowed_readers, ElementsAre("10.0.0.2", "10.0.0.3"));
+  const ModbusTcpRobot& robot = std::get<ModbusTcpOptions>(cell.robots[0].link).robot;
+  EXPECT_FALSE(robot.unit.require_command_crc);
+  EXPECT_THAT(robot.allowed_writers, ElementsAre("10.0.0.1"));
+  EXPECT_THAT(robot.allowed_readers, ElementsAre("10.0.0.2", "10.0.0.3"));
 }
 
 TEST(Cell, WithoutTheOptionalKeysNothingMoreIsChecked) {
@@ -238,8 +240,9 @@ INSTANTIATE_TEST_SUITE_P(
                 "jobs[0].nominal_pose[5]: found 361, expected a number from -360 to 360"},
         Mistake{"/jobs/0/marks/3", "4", "jobs[0].marks[3]: found 4, expected an object"},
         Mistake{"/jobs/0/limits", "[]", "jobs[0].limits: found an array of 0, expected an object"},
-        Mistake{"/robots/0/link/type", "\"can\"",
-                "robots[0].link.type: found \"can\", expected one of modbus-tcp"},
+        Mistake{"/robots/0/link/type", "\"usb\"",
+                "robots[0].link.type: found \"usb\", expected one of modbus-tcp, modbus-rtu, modbus-client, "
+                "can"},
         Mistake{"/cameras/0/driver", "\"usb\"",
                 "cameras[0].driver: found \"usb\", expected one of gige, v4l2, folder"},
         Mistake{"/timing/deadline_ms", "49",
@@ -342,7 +345,7 @@ TEST(Cell, TwoRobotsNeedTheirOwnPorts) {
   json["robots"][1]["name"] = "robot2";
   EXPECT_THAT(
       mistakes_in(json),
-      ElementsAre("cell.json: robots[1].link.port: found 127.0.0.1:1502, as in robots[0].link, expected a "
+      ElementsAre("cell.json: robots[1].link.unit: found 127.0.0.1:1502 unit 1, as in robots[0].link, expected a "
                   "port or a unit id of its own for each robot"));
   json["robots"][1]["link"]["address"] = "0.0.0.0";
   EXPECT_EQ(mistakes_in(json).size(), 1U);

@@ -63,17 +63,32 @@ Json full_example() {
   json["robots"][0]["require_command_crc"] = false;
   json["robots"][0]["allowed_writers"] = {"10.0.0.1"};
   json["robots"][0]["allowed_readers"] = {"10.0.0.2"};
+  json["robots"][0]["result_data_id"] = 1;
+  json["robots"][0]["command_data_id"] = 2;
+  for (const char* link :
+       {R"({"type": "modbus-rtu", "device": "/dev/ttyS0", "baud": 9600, "parity": "none",
+    "stop_bits": 2, "unit": 1, "gap_tolerance_ms": 20})",
+        R"({"type": "modbus-client", "address": "10.0.0.5", "port": 502, "command_address": 1,
+    "result_address": 100, "life_address": 200, "poll_ms": 5, "response_timeout_ms": 50, "max_registers": 32})",
+        R"({"type": "can", "interface": "can0", "node": 5, "fd": false, "heartbeat_ms": 100,
+    "length_scale_um": 10, "angle_scale_deg": 0.001, "rotation_vector_scale_rad": 0.0001, "start_at_once": true})"}) {
+    Json robot = example()["robots"][0];
+    robot["name"] = "robot" + std::to_string(json["robots"].size() + 1);
+    robot["link"] = parsed(link);
+    json["robots"].push_back(robot);
+  }
   return json;
 }
 
-// The place of a key in the example: each driver has keys of its own and a camera of its own there.
+// The place of a key in the example: each driver has keys of its own and a camera of its own there, each type
+// of link a robot.
 Json::json_pointer place_of_key(const Json& full, const std::string& pointer) {
-  const std::string cameras = "/cameras/0/";
-  for (const char* other : {"/cameras/0/", "/cameras/1/", "/cameras/2/"}) {
-    std::string moved = pointer;
-    if (moved.starts_with(cameras)) moved.replace(0, cameras.size(), other);
-    if (full.contains(Json::json_pointer(moved))) return Json::json_pointer(moved);
-  }
+  for (const std::string list : {"/cameras/", "/robots/"})
+    for (std::size_t i = 0; i < 4; ++i) {
+      std::string moved = pointer;
+      if (moved.starts_with(list + "0/")) moved.replace(0, list.size() + 1, list + std::to_string(i));
+      if (full.contains(Json::json_pointer(moved))) return Json::json_pointer(moved);
+    }
   return Json::json_pointer(pointer);
 }
 
