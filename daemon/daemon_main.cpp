@@ -72,6 +72,20 @@ class Links {
     }
     wires_ = open_wires(cell.robots, endpoints_);
     rounds_.resize(wires_.size());
+    problems_.resize(wires_.size());
+  }
+
+  // Says once what keeps a wire from its robots, and once when it is gone.
+  void log_problems() {
+    for (std::size_t i = 0; i < wires_.size(); ++i) {
+      const std::string problem = wires_[i]->problem();
+      if (problem == problems_[i]) continue;
+      if (problem.empty())
+        spdlog::info("a robot's link is there again; it was: {}", problems_[i]);
+      else
+        spdlog::warn("a robot's link: {}", problem);
+      problems_[i] = problem;
+    }
   }
 
   // True when the loop of every wire has come round since the last look.
@@ -89,6 +103,7 @@ class Links {
   std::vector<std::unique_ptr<RobotEndpoint>> endpoints_;
   std::vector<std::unique_ptr<Wire>> wires_;
   std::vector<std::uint64_t> rounds_;
+  std::vector<std::string> problems_;
 };
 
 // Tells progress from standstill.
@@ -110,6 +125,7 @@ void serve(const Cycle& cycle, Links& links, const sigset_t& signals) {
   bool alive = true;
   while (!stop_wanted(signals, period)) {
     const bool progress = progresses(cycle, links);
+    links.log_problems();
     if (progress) notify_alive();
     if (alive && !progress)
       spdlog::critical("no progress in the cycle or a link: the watchdog is no longer fed");

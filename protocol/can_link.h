@@ -25,7 +25,7 @@ class CanLink : public Wire {
   std::uint64_t rounds() const override;  // grows at least twice a second while the link is alive
   CanFault fault() const;
   // Why there is no bus, and what to do; empty: there is one.
-  std::string problem() const;
+  std::string problem() const override;
 
  private:
   class Loop;

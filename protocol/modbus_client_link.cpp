@@ -302,4 +302,9 @@ ModbusClientLink::~ModbusClientLink() = default;
 ModbusClientCounters ModbusClientLink::counters() const { return loop_->counters(); }
 std::uint64_t ModbusClientLink::rounds() const { return loop_->rounds(); }
 
+std::string ModbusClientLink::problem() const {
+  const ModbusClientCounters now = counters();
+  return now.connected ? std::string() : now.last_failure;
+}
+
 }  // namespace zeropose

@@ -66,6 +66,7 @@ class ModbusClientLink : public Wire {
   // Grows before every question to the controller and at least twice a second: a time-out of 5 s is the
   // longest that it can stand still.
   std::uint64_t rounds() const override;
+  std::string problem() const override;
 
  private:
   class Loop;

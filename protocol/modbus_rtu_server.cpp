@@ -272,5 +272,9 @@ ModbusRtuServer::ModbusRtuServer(const ModbusRtuOptions& options, RobotEndpoint&
 ModbusRtuServer::~ModbusRtuServer() = default;
 ModbusRtuCounters ModbusRtuServer::counters() const { return loop_->counters(); }
 std::uint64_t ModbusRtuServer::rounds() const { return loop_->rounds(); }
+std::string ModbusRtuServer::problem() const {
+  const ModbusRtuCounters now = counters();
+  return now.open ? std::string() : now.last_failure;
+}
 
 }  // namespace zeropose

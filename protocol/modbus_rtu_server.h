@@ -50,6 +50,7 @@ class ModbusRtuServer : public Wire {
 
   ModbusRtuCounters counters() const;
   std::uint64_t rounds() const override;
+  std::string problem() const override;
 
  private:
   class Loop;

@@ -48,6 +48,7 @@ class ModbusTcpServer : public Wire {
   std::uint16_t port() const;
   ModbusCounters counters() const;
   std::uint64_t rounds() const override { return counters().rounds; }
+  std::string problem() const override { return {}; }
 
  private:
   class Loop;

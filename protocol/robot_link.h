@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 
 #include "protocol/report.h"
 
@@ -26,6 +27,8 @@ class Wire {
   virtual ~Wire() = default;
   // Of the thread's loop: grows at least twice a second while it is alive.
   virtual std::uint64_t rounds() const = 0;
+  // Why nobody can be reached on it at the moment, and what to do; empty: it is ready.
+  virtual std::string problem() const = 0;
 };
 
 }  // namespace zeropose
