@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <sstream>
 
 namespace zeropose {
 namespace {
@@ -163,6 +164,27 @@ void check_lists(const ModbusTcpRobot& robot, const std::string& path, JsonReadi
                           "each address in one of the two lists");
 }
 
+// Rz Ry Rz: next to no turn at all the first angle is anything up to 180 degrees.
+bool has_large_angles(Convention convention) {
+  return convention == Convention::kawasaki || convention == Convention::comau ||
+         convention == Convention::adept || convention == Convention::doosan;
+}
+
+void check_can(const CanOptions& can, Convention convention, const std::string& path, JsonReading& reading) {
+  constexpr double least_for_large_angles_deg = 0.0055;  // 180 degrees in an int16
+  const std::string name(name_of(convention));
+  if (!fits_can(convention))
+    reading.add_mistake(path + ".convention", in_quotes(name),
+                        "a convention with three lengths and three angles for a link of type can");
+  if (fits_can(convention) && !can.fd && has_large_angles(convention) &&
+      can.angle_scale_deg < least_for_large_angles_deg) {
+    std::ostringstream found;
+    found << can.angle_scale_deg;
+    reading.add_mistake(path + ".link.angle_scale_deg", found.str(),
+                        "0.01, since the angles of convention " + name + " reach 180 degrees");
+  }
+}
+
 void check_robots(const Cell& cell, JsonReading& reading) {
   check_unique(cell.robots, "robots", "name", name_in_quotes, reading);
   check_places(cell.robots, reading);
@@ -170,9 +192,8 @@ void check_robots(const Cell& cell, JsonReading& reading) {
     const RobotOptions& robot = cell.robots[i];
     const std::string path = path_of("robots", i);
     if (const auto* tcp = std::get_if<ModbusTcpOptions>(&robot.link)) check_lists(tcp->robot, path, reading);
-    if (std::holds_alternative<CanOptions>(robot.link) && !fits_can(robot.convention))
-      reading.add_mistake(path + ".convention", in_quotes(std::string(name_of(robot.convention))),
-                          "a convention with three lengths and three angles for a link of type can");
+    if (const auto* can = std::get_if<CanOptions>(&robot.link))
+      check_can(*can, robot.convention, path, reading);
   }
 }
 

@@ -145,5 +145,22 @@ TEST(RobotLink, AQuaternionDoesNotFitIntoACanFrame) {
                           "with three lengths and three angles for a link of type can"));
 }
 
+TEST(RobotLink, AnglesThatWouldNeverFitIntoACanFrame) {
+  Json json = with_link({{"type", "can"}, {"interface", "can0"}});
+  for (const char* convention : {"kawasaki", "comau", "adept", "doosan"}) {
+    json["robots"][0]["link"]["fd"] = false;
+    json["robots"][0]["link"].erase("angle_scale_deg");
+    json["robots"][0]["convention"] = convention;
+    EXPECT_THAT(mistakes_in(json),
+                ElementsAre(testing::StartsWith(
+                    "cell.json: robots[0].link.angle_scale_deg: found 0.001, expected 0.01")));
+    json["robots"][0]["link"]["angle_scale_deg"] = 0.01;
+    EXPECT_THAT(mistakes_in(json), IsEmpty());
+    json["robots"][0]["link"]["angle_scale_deg"] = 0.001;
+    json["robots"][0]["link"]["fd"] = true;
+    EXPECT_THAT(mistakes_in(json), IsEmpty());
+  }
+}
+
 }  // namespace
 }  // namespace zeropose
