@@ -1,5 +1,6 @@
 #include "config/cell_checks.h"
 #include "config/text.h"
+#include "protocol/link_checks.h"
 
 #include <algorithm>
 #include <cmath>
@@ -119,13 +120,6 @@ void check_ports(const ModbusTcpOptions& tcp, const ModbusTcpOptions& other, con
   }
 }
 
-void check_places(const ModbusRtuOptions& rtu, const ModbusRtuOptions& other, const std::string& path,
-                  const std::string& other_path, JsonReading& reading) {
-  if (!rtu.line.device.empty() && rtu.line.device == other.line.device)
-    reading.add_mistake(path + ".device", in_quotes(rtu.line.device) + ", as in " + other_path,
-                        "a serial line of its own for each robot");
-}
-
 void check_places(const CanOptions& can, const CanOptions& other, const std::string& path,
                   const std::string& other_path, JsonReading& reading) {
   if (can.interface == other.interface && can.node == other.node)
@@ -139,13 +133,37 @@ void check_places(const ModbusTcpOptions& tcp, const ModbusTcpOptions& other, co
   check_ports(tcp, other, path, other_path, reading);
 }
 
-void check_places(const ModbusClientOptions&, const ModbusClientOptions&, const std::string&,
-                  const std::string&, JsonReading&) {}
+// Two robots' blocks on one controller would overwrite each other.
+void check_places(const ModbusClientOptions& client, const ModbusClientOptions& other,
+                  const std::string& path, const std::string& other_path, JsonReading& reading) {
+  const auto* tcp = std::get_if<ModbusTcpAddress>(&client.where);
+  const auto* other_tcp = std::get_if<ModbusTcpAddress>(&other.where);
+  if (tcp == nullptr || other_tcp == nullptr || tcp->address.empty()) return;
+  if (tcp->address == other_tcp->address && tcp->port == other_tcp->port && client.unit == other.unit)
+    reading.add_mistake(path + ".address", describe(client) + ", as in " + other_path,
+                        "a controller, or a unit of it, of its own for each robot");
+}
+
+void check_places(const ModbusRtuOptions&, const ModbusRtuOptions&, const std::string&, const std::string&,
+                  JsonReading&) {}
+
+// The serial device of a link; empty: it has none.
+std::string device_of(const LinkOptions& link) {
+  if (const auto* rtu = std::get_if<ModbusRtuOptions>(&link)) return rtu->line.device;
+  const auto* client = std::get_if<ModbusClientOptions>(&link);
+  const auto* line = client != nullptr ? std::get_if<SerialLine>(&client->where) : nullptr;
+  return line != nullptr ? line->device : std::string();
+}
 
 // No two robots in one place.
 void check_places(const std::vector<RobotOptions>& robots, JsonReading& reading) {
   for (std::size_t i = 0; i < robots.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
+    for (std::size_t j = 0; j < i; ++j) {
+      const std::string device = device_of(robots[i].link);
+      if (!device.empty() && device == device_of(robots[j].link))
+        reading.add_mistake(path_of("robots", i) + ".link.device",
+                            in_quotes(device) + ", as in " + path_of("robots", j) + ".link",
+                            "a serial line of its own for each robot");
       std::visit(
           [&]<class Link>(const Link& link) {
             if (const auto* other = std::get_if<Link>(&robots[j].link))
@@ -153,6 +171,7 @@ void check_places(const std::vector<RobotOptions>& robots, JsonReading& reading)
                            reading);
           },
           robots[i].link);
+    }
 }
 
 void check_lists(const ModbusTcpRobot& robot, const std::string& path, JsonReading& reading) {
@@ -185,6 +204,29 @@ void check_can(const CanOptions& can, Convention convention, const std::string& 
   }
 }
 
+// A command on CAN has eight bytes: no argument, and one byte for the job.
+void check_what_can_carries(const RobotOptions& robot, const std::vector<Job>& jobs, const std::string& path,
+                            JsonReading& reading) {
+  if (robot.axis)
+    reading.add_mistake(path + ".axis", "a linear axis with a link of type can",
+                        "another link, since a command on CAN cannot tell the position of the axis");
+  for (const Job& job : jobs)
+    if (job.number > 255)
+      reading.add_mistake(path + ".link", "job " + std::to_string(job.number),
+                          "job numbers up to 255 with a link of type can");
+}
+
+// What only shows when all keys are there; not said of a link that has mistakes already.
+void check_whole(const LinkOptions& link, const std::string& path, JsonReading& reading) {
+  if (!reading.mistakes().empty()) return;
+  try {
+    if (const auto* rtu = std::get_if<ModbusRtuOptions>(&link)) check(*rtu);
+    if (const auto* client = std::get_if<ModbusClientOptions>(&link)) check(*client);
+  } catch (const std::invalid_argument& error) {
+    reading.add_mistake(path, describe(link), error.what());
+  }
+}
+
 void check_robots(const Cell& cell, JsonReading& reading) {
   check_unique(cell.robots, "robots", "name", name_in_quotes, reading);
   check_places(cell.robots, reading);
@@ -192,8 +234,11 @@ void check_robots(const Cell& cell, JsonReading& reading) {
     const RobotOptions& robot = cell.robots[i];
     const std::string path = path_of("robots", i);
     if (const auto* tcp = std::get_if<ModbusTcpOptions>(&robot.link)) check_lists(tcp->robot, path, reading);
-    if (const auto* can = std::get_if<CanOptions>(&robot.link))
+    if (const auto* can = std::get_if<CanOptions>(&robot.link)) {
       check_can(*can, robot.convention, path, reading);
+      check_what_can_carries(robot, cell.jobs, path, reading);
+    }
+    check_whole(robot.link, path + ".link", reading);
   }
 }
 

@@ -65,7 +65,7 @@ void read_client(JsonObject& object, ModbusClientOptions& client) {
   read_whole(object, "result_address", 0, 65535, client.result_address);
   read_whole(object, "life_address", 0, 65535, client.life_address);
   read_time(object, "poll_ms", 1, 1000, client.poll_period);
-  read_time(object, "response_timeout_ms", 1, 5000, client.response_timeout);
+  read_time(object, "response_timeout_ms", 1, 1000, client.response_timeout);
   read_whole(object, "max_registers", 10, 123, client.max_registers);
 }
 
@@ -137,7 +137,8 @@ void read_members(JsonObject& object, AnyLink& link) {
   read_time(object, "gap_tolerance_ms", 0, 100, link.rtu.gap_tolerance);
   read_client(object, link.client);
   read_can(object, link.can);
-  read_time(object, "heartbeat_ms", link.kind == can ? 0 : 10, link.kind == can ? 65535 : 10000,
+  // A robot takes a life that stands still for a second for a dead one.
+  read_time(object, "heartbeat_ms", link.kind == can ? 0 : 10, link.kind == can ? 65535 : 300,
             link.kind == can ? link.can.heartbeat : link.client.heartbeat_period);
   if (link.known) check_keys(object, link);
   link.tcp.address = address;

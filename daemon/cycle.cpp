@@ -91,6 +91,9 @@ void Cycle::stop() {
 void Cycle::enqueue(const Request& request) {
   {
     const std::lock_guard lock(mutex_);
+    // A Reset is answered at once: a robot could pile them up before a long zero measurement. One is as good
+    // as many.
+    if (request.kind == CommandKind::reset && std::exchange(reset_waits_, true)) return;
     robot_tasks_.push_back([this, request] { carry_out(request); });
   }
   wake_.notify_all();
@@ -201,6 +204,10 @@ Status Cycle::status() const {
 
 void Cycle::carry_out(const Request& request) {
   if (request.kind == CommandKind::reset) {  // the handshake answers it by itself
+    {
+      const std::lock_guard lock(mutex_);
+      reset_waits_ = false;
+    }
     X_O0O_last_.reset();
     return refresh();
   }

@@ -132,6 +132,7 @@ class Cycle {
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Task> robot_tasks_, other_tasks_;
+  bool reset_waits_ = false;  // among the robots' tasks
   Status status_;
   bool stopping_ = false;
   std::atomic<TimePoint> last_progress_{};

@@ -88,6 +88,11 @@ class Links {
     }
   }
 
+  // Withdraws every result and takes no more measurements, while the wires still tell the robots so.
+  void withdraw() {
+    for (const auto& endpoint : endpoints_) endpoint->set_cell_state(CellState{});
+  }
+
   // True when the loop of every wire has come round since the last look.
   bool alive() {
     bool all = true;
@@ -133,17 +138,22 @@ void serve(const Cycle& cycle, Links& links, const sigset_t& signals) {
   }
 }
 
-// The cycle publishes through the links: it stops before they go, also when something throws.
+// The cycle publishes through the links: it stops before they go, also when something throws. From then on
+// nobody looks whether a result still holds.
 struct StopFirst {
   Cycle& cycle;
-  ~StopFirst() { cycle.stop(); }
+  Links& links;
+  ~StopFirst() {
+    cycle.stop();
+    links.withdraw();
+  }
 };
 
 void run(const Options& options) {
   const sigset_t signals = block_stop_signals();
   Cycle cycle(load_cell(options.cell), options.state);
   Links links(cycle);
-  const StopFirst stop_first{cycle};
+  const StopFirst stop_first{cycle, links};
   cycle.start();
   const LineServer control(options.socket,
                            [&cycle](const std::string& line) { return answer_control(cycle, line); });

@@ -14,7 +14,7 @@ void notify_stopping() { sd_notify(0, "STOPPING=1"); }
 std::optional<std::chrono::milliseconds> watchdog_interval() {
   std::uint64_t period_us = 0;
   if (sd_watchdog_enabled(0, &period_us) <= 0) return std::nullopt;
-  return std::chrono::milliseconds(period_us / 2000);
+  return std::chrono::milliseconds(period_us / 4000);
 }
 
 }  // namespace zeropose

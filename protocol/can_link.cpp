@@ -21,8 +21,23 @@ namespace {
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr milliseconds longest_wait{500}, first_pause{50}, longest_pause{2000};
+constexpr milliseconds longest_wait{500}, first_pause{50}, longest_pause{2000}, last_words{50};
 constexpr int frames_per_round = 64;
+
+std::string fault_text(CanFault fault, const std::string& interface) {
+  switch (fault) {
+    case CanFault::none:
+      return {};
+    case CanFault::bus_off:
+      return "CAN " + interface +
+             ": the controller was switched off the bus; check cable, termination and bit rate, let it "
+             "come " +
+             "back (ip link set " + interface + " type can restart-ms 100), then Reset";
+    default:
+      return "CAN " + interface +
+             ": another device sends with this node's identifiers; give it another node id, then Reset";
+  }
+}
 
 }  // namespace
 
@@ -93,7 +108,6 @@ CanLink::Loop::~Loop() {
   stopping_ = true;
   wake();
   thread_.join();
-  endpoint_.disconnected(connection_);
 }
 
 void CanLink::Loop::wake() {
@@ -104,6 +118,10 @@ void CanLink::Loop::wake() {
 
 void CanLink::Loop::run() {
   while (!stopping_) round();
+  // The bus is told that there is no result any more, if it takes frames.
+  endpoint_.disconnected(connection_);
+  const TimePoint end = Clock::now() + last_words;
+  while (socket_ && Clock::now() < end) round();
 }
 
 void CanLink::Loop::round() {
@@ -195,7 +213,7 @@ void CanLink::Loop::tell() {
   counters_ = node_.counters();
   counters_.rounds = rounds_;
   fault_ = node_.fault();
-  problem_ = why_closed_;
+  problem_ = why_closed_.empty() ? fault_text(fault_, options_.interface) : why_closed_;
 }
 
 CanLink::CanLink(const CanOptions& options, RobotEndpoint& endpoint)

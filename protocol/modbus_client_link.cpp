@@ -14,6 +14,7 @@
 
 #include "protocol/command_watch.h"
 #include "protocol/controller_blocks.h"
+#include "protocol/link_checks.h"
 #include "protocol/modbus_framing.h"
 
 namespace zeropose {
@@ -52,20 +53,6 @@ void check_addresses(const ModbusClientOptions& options) {
   }
 }
 
-const ModbusClientOptions& checked(const ModbusClientOptions& options) {
-  check_addresses(options);
-  check_range(options.poll_period, 1, 1000, "poll period");
-  check_range(options.heartbeat_period, 10, 10000, "heartbeat period");
-  check_range(options.response_timeout, 1, 5000, "response time-out");
-  check_range(options.first_pause, 1, 60000, "first pause before connecting again");
-  check_range(options.longest_pause, static_cast<int>(options.first_pause.count()), 600000,
-              "longest pause before connecting again");
-  expect(options.max_registers >= command_reg::block_size && options.max_registers <= 123,
-         "max registers must be 10..123, not " + std::to_string(options.max_registers));
-  expect(options.write_attempts >= 1, "write attempts must be at least 1");
-  return options;
-}
-
 // What a server would answer with; 0: nothing to complain about.
 std::uint16_t exception_of(CommandVerdict verdict) {
   if (verdict == CommandVerdict::accepted) return 0;
@@ -73,6 +60,19 @@ std::uint16_t exception_of(CommandVerdict verdict) {
 }
 
 }  // namespace
+
+void check(const ModbusClientOptions& options) {
+  check_addresses(options);
+  check_range(options.poll_period, 1, 1000, "poll period");
+  check_range(options.heartbeat_period, 10, 10000, "heartbeat period");
+  check_range(options.response_timeout, 1, 1000, "response time-out");
+  check_range(options.first_pause, 1, 60000, "first pause before connecting again");
+  check_range(options.longest_pause, static_cast<int>(options.first_pause.count()), 600000,
+              "longest pause before connecting again");
+  expect(options.max_registers >= command_reg::block_size && options.max_registers <= 123,
+         "max registers must be 10..123, not " + std::to_string(options.max_registers));
+  expect(options.write_attempts >= 1, "write attempts must be at least 1");
+}
 
 class ModbusClientLink::Loop {
  public:
@@ -128,7 +128,7 @@ class ModbusClientLink::Loop {
 };
 
 ModbusClientLink::Loop::Loop(const ModbusClientOptions& options, RobotEndpoint& endpoint)
-    : options_(checked(options)),
+    : options_((check(options), options)),
       endpoint_(endpoint),
       wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
       blocks_(options_, events()),

@@ -33,7 +33,7 @@ struct ModbusClientOptions {
   std::chrono::milliseconds poll_period{20};  // 1..1000
   // The result block is written at least so often; 10..10000.
   std::chrono::milliseconds heartbeat_period{200};
-  std::chrono::milliseconds response_timeout{200};  // 1..5000
+  std::chrono::milliseconds response_timeout{200};  // 1..1000
   // The pause before connecting again; doubles up to the longest.
   std::chrono::milliseconds first_pause{100}, longest_pause{5000};
   std::size_t max_registers = 123;  // that the controller takes or gives in one message, 10..123
@@ -63,8 +63,8 @@ class ModbusClientLink : public Wire {
   ModbusClientLink& operator=(const ModbusClientLink&) = delete;
 
   ModbusClientCounters counters() const;
-  // Grows before every question to the controller and at least twice a second: a time-out of 5 s is the
-  // longest that it can stand still.
+  // Grows before every question to the controller and at least twice a second: two seconds, on a serial line
+  // whose controller is silent, are the longest that it can stand still.
   std::uint64_t rounds() const override;
   std::string problem() const override;
 

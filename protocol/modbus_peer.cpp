@@ -66,7 +66,7 @@ PeerProblem problem_of(int error) {
 
 // True: nothing came for `silence`. False: the line is never quiet, or gone.
 bool wait_for_silence(int device, milliseconds silence) {
-  const auto patience = Clock::now() + 4 * silence;
+  const auto patience = Clock::now() + std::min(4 * silence, milliseconds(1000));
   std::array<char, 256> late{};
   while (Clock::now() < patience) {
     pollfd entry{device, POLLIN, 0};

@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "protocol/link_checks.h"
 #include "protocol/modbus_reply.h"
 #include "protocol/rtu_framing.h"
 
@@ -32,19 +33,6 @@ void check_range(milliseconds value, int lowest, int highest, const char* what) 
                                 ".." + std::to_string(highest) + " ms, not " + std::to_string(value.count()));
 }
 
-const ModbusRtuOptions& checked(const ModbusRtuOptions& options) {
-  check(options.line);
-  if (options.unit.unit < 1 || options.unit.unit > 247)
-    throw std::invalid_argument("Modbus RTU: unit must be 1..247, not " + std::to_string(options.unit.unit));
-  check_range(options.answer_within, 10, 10000, "the time for an answer");
-  check_range(options.master_timeout, 100, 600000, "the master's time-out");
-  check_range(options.gap_tolerance, 0, 100, "the gap tolerance");
-  check_range(options.first_pause, 1, 60000, "the first pause before opening again");
-  check_range(options.longest_pause, static_cast<int>(options.first_pause.count()), 600000,
-              "the longest pause before opening again");
-  return options;
-}
-
 Counter counter_of(RtuProblem problem) {
   switch (problem) {
     case RtuProblem::wrong_length:
@@ -62,6 +50,18 @@ Counter counter_of(RtuProblem problem) {
 }
 
 }  // namespace
+
+void check(const ModbusRtuOptions& options) {
+  check(options.line);
+  if (options.unit.unit < 1 || options.unit.unit > 247)
+    throw std::invalid_argument("Modbus RTU: unit must be 1..247, not " + std::to_string(options.unit.unit));
+  check_range(options.answer_within, 10, 10000, "the time for an answer");
+  check_range(options.master_timeout, 100, 600000, "the master's time-out");
+  check_range(options.gap_tolerance, 0, 100, "the gap tolerance");
+  check_range(options.first_pause, 1, 60000, "the first pause before opening again");
+  check_range(options.longest_pause, static_cast<int>(options.first_pause.count()), 600000,
+              "the longest pause before opening again");
+}
 
 class ModbusRtuServer::Loop {
  public:
@@ -110,7 +110,7 @@ class ModbusRtuServer::Loop {
 };
 
 ModbusRtuServer::Loop::Loop(const ModbusRtuOptions& options, RobotEndpoint& endpoint)
-    : options_(checked(options)),
+    : options_((check(options), options)),
       endpoint_(endpoint),
       unit_(options.unit, endpoint),
       wake_(eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),

@@ -50,7 +50,7 @@ TEST(RobotLink, ControllerThatIsTheServer) {
   const auto client = read<ModbusClientOptions>(with_link({{"type", "modbus-client"},
                                                            {"address", "10.0.0.5"},
                                                            {"port", 502},
-                                                           {"unit", 255 - 8},
+                                                           {"unit", 247},
                                                            {"command_address", 1},
                                                            {"result_address", 100},
                                                            {"life_address", 200},
@@ -160,6 +160,44 @@ TEST(RobotLink, AnglesThatWouldNeverFitIntoACanFrame) {
     json["robots"][0]["link"]["fd"] = true;
     EXPECT_THAT(mistakes_in(json), IsEmpty());
   }
+}
+
+TEST(RobotLink, NoSecondRobotOnALineOrAController) {
+  Json json = with_link({{"type", "modbus-rtu"}, {"device", "/dev/ttyS0"}});
+  json["robots"].push_back(json["robots"][0]);
+  json["robots"][1]["name"] = "robot2";
+  json["robots"][1]["link"] = {{"type", "modbus-client"}, {"device", "/dev/ttyS0"}, {"unit", 2}};
+  EXPECT_THAT(
+      mistakes_in(json),
+      ElementsAre("cell.json: robots[1].link.device: found \"/dev/ttyS0\", as in robots[0].link, expected a "
+                  "serial line of its own for each robot"));
+  const Json controller = {{"type", "modbus-client"}, {"address", "10.0.0.5"}, {"port", 502}};
+  json["robots"][0]["link"] = json["robots"][1]["link"] = controller;
+  ASSERT_EQ(mistakes_in(json).size(), 1u);
+  EXPECT_THAT(mistakes_in(json)[0], testing::HasSubstr("robots[1].link.address"));
+  json["robots"][1]["link"]["unit"] = 2;
+  EXPECT_THAT(mistakes_in(json), IsEmpty());
+}
+
+// A command on CAN cannot tell where the axis is: the correction would be wrong and valid.
+TEST(RobotLink, NoAxisOnACanBus) {
+  Json json = with_link({{"type", "can"}, {"interface", "can0"}});
+  json["robots"][0]["axis"] = {{"direction", {1, 0, 0}}, {"zero_mm", 0}};
+  EXPECT_THAT(mistakes_in(json),
+              ElementsAre(testing::StartsWith("cell.json: robots[0].axis: found a linear axis")));
+}
+
+TEST(RobotLink, JobsThatACanFrameCannotName) {
+  Json json = with_link({{"type", "can"}, {"interface", "can0"}});
+  json["jobs"][0]["number"] = 261;
+  EXPECT_THAT(mistakes_in(json), ElementsAre(testing::HasSubstr("job numbers up to 255")));
+}
+
+TEST(RobotLink, BlocksThatOverlapInTheController) {
+  const auto mistakes = mistakes_in(with_link(
+      {{"type", "modbus-client"}, {"address", "10.0.0.5"}, {"port", 502}, {"command_address", 135}}));
+  ASSERT_EQ(mistakes.size(), 1u);
+  EXPECT_THAT(mistakes[0], testing::HasSubstr("command and result block overlap"));
 }
 
 }  // namespace

@@ -370,7 +370,7 @@ TEST_F(ClientLinkTest, OptionsOutOfRangeAreNamed) {
   EXPECT_THAT(refusal([](auto& o) { o.result_address = 65476; }), HasSubstr("65535"));
   EXPECT_THAT(refusal([](auto& o) { o.max_registers = 9; }), HasSubstr("10..123"));
   EXPECT_THAT(refusal([](auto& o) { o.poll_period = milliseconds(0); }), HasSubstr("poll period"));
-  EXPECT_THAT(refusal([](auto& o) { o.response_timeout = milliseconds(5001); }), HasSubstr("1..5000"));
+  EXPECT_THAT(refusal([](auto& o) { o.response_timeout = milliseconds(1001); }), HasSubstr("1..1000"));
   EXPECT_THAT(refusal([](auto& o) { o.write_attempts = 0; }), HasSubstr("attempts"));
   EXPECT_THAT(refusal([](auto& o) { o.where = ModbusTcpAddress{"robot", 502}; }), HasSubstr("IPv4"));
   EXPECT_THAT(refusal([](auto& o) { o.where = SerialLine{"/dev/x", 19200, 'X', 1}; }), HasSubstr("parity"));
