@@ -55,16 +55,21 @@ void measure_cycles(benchmark::State& state, ServerKind kind, std::uint16_t port
   state.counters["max_us"] = times_us.back();
 }
 
-constexpr std::size_t cycles = 5000;
+// The same while a load is played, and what the others got.
+void measure_beside(benchmark::State& state, ServerKind kind, std::uint16_t port, Load& others) {
+  constexpr std::size_t cycles = 5000;
+  const PlayedLoad played(others);
+  measure_cycles(state, kind, port, cycles);
+  state.counters["answers_per_s"] = static_cast<double>(others.answers) / played.seconds();
+  state.counters["connections_per_s"] = static_cast<double>(others.connections) / played.seconds();
+}
 
 template <class Others>
 void with_others(benchmark::State& state, ServerKind kind) {
   for (auto _ : state) {
     const ServerProcess server(kind);
     Others others(server.port(), static_cast<std::size_t>(state.range(0)) - 1);
-    const PlayedLoad played(others);
-    measure_cycles(state, kind, server.port(), cycles);
-    state.counters["steps_per_s"] = played.steps_per_s();
+    measure_beside(state, kind, server.port(), others);
   }
 }
 
@@ -75,23 +80,18 @@ void slow_clients(benchmark::State& state) {
   for (auto _ : state) {
     const ServerProcess server(ServerKind::ours);
     SlowClients others(server.port(), 100);
-    const PlayedLoad played(others);
-    measure_cycles(state, ServerKind::ours, server.port(), cycles);
-    state.counters["steps_per_s"] = played.steps_per_s();
+    measure_beside(state, ServerKind::ours, server.port(), others);
   }
 }
 
-// steps_per_s: so many connections a second, and ten times as many requests.
 void flood(benchmark::State& state) {
   for (auto _ : state) {
     const ServerProcess server(ServerKind::ours);
     measure_cycles(state, ServerKind::ours, server.port(), 100);
     const double before_kb = server.resident_kb();
     Flood others(server.port());
-    const PlayedLoad played(others);
-    measure_cycles(state, ServerKind::ours, server.port(), cycles);
+    measure_beside(state, ServerKind::ours, server.port(), others);
     state.counters["growth_kb"] = server.resident_kb() - before_kb;
-    state.counters["steps_per_s"] = played.steps_per_s();
   }
 }
 

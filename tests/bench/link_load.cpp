@@ -15,13 +15,6 @@ const Bytes& read_request() {
   return request;
 }
 
-// What has come is thrown away. False: the server has closed.
-bool drain(const RawModbus& client) {
-  std::array<std::uint8_t, 2048> bytes{};
-  const ssize_t size = ::recv(client.descriptor(), bytes.data(), bytes.size(), MSG_DONTWAIT);
-  return size > 0 || (size < 0 && errno == EAGAIN);
-}
-
 // Without the minute in which the port would stay taken.
 void reset_on_close(const RawModbus& client) {
   const linger at_once{1, 0};
@@ -32,6 +25,14 @@ void reset_on_close(const RawModbus& client) {
 
 IdleClients::IdleClients(std::uint16_t port, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) clients_.emplace_back(port);
+}
+
+bool IdleClients::drain(const RawModbus& client) {
+  constexpr std::size_t answer_size = 9 + 2 * reg::block_size;
+  std::array<std::uint8_t, 16 * answer_size> bytes{};
+  const ssize_t size = ::recv(client.descriptor(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+  if (size > 0) answers += static_cast<std::size_t>(size) / answer_size;
+  return size > 0 || (size < 0 && errno == EAGAIN);
 }
 
 void ReadingClients::step(std::uint64_t millisecond) {
@@ -45,7 +46,10 @@ void SlowClients::step(std::uint64_t millisecond) {
   if (millisecond % 400 != 0) return;
   const Bytes whole = adu(1, command_pdu({5, 1, 1, 0, 0}));
   for (RawModbus& client : clients_) {
-    if (!drain(client)) client = RawModbus(port_);
+    if (!drain(client)) {
+      client = RawModbus(port_);
+      ++connections;
+    }
     client.send({whole[sent_]});
   }
   // All have been closed, a second after the first byte, when it is time for the fourth.
@@ -58,15 +62,16 @@ void Flood::step(std::uint64_t millisecond) {
     client.send(read_request());
   }
   RawModbus passing(port_);
+  ++connections;
   reset_on_close(passing);
   if (millisecond % 2 == 0) passing.send(read_request());
 }
 
 PlayedLoad::PlayedLoad(Load& load)
     : thread_([this, &load] {
-        while (!stop_) {
-          load.step(steps_++);
-          std::this_thread::sleep_until(start_ + steps_.load() * milliseconds(1));
+        for (std::uint64_t step = 0; !stop_; ++step) {
+          std::this_thread::sleep_until(start_ + step * milliseconds(1));
+          load.step(step);
         }
       }) {}
 
@@ -75,9 +80,8 @@ PlayedLoad::~PlayedLoad() {
   thread_.join();
 }
 
-double PlayedLoad::steps_per_s() const {
-  return static_cast<double>(steps_) /
-         std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+double PlayedLoad::seconds() const {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
 }
 
 }  // namespace zeropose

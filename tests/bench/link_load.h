@@ -15,6 +15,9 @@ class Load {
  public:
   virtual ~Load() = default;
   virtual void step(std::uint64_t millisecond) = 0;  // called once for each millisecond, late ones too
+
+  std::atomic<std::uint64_t> answers = 0;      // whole blocks that came back
+  std::atomic<std::uint64_t> connections = 0;  // made after the first ones
 };
 
 // Connected and silent.
@@ -24,6 +27,9 @@ class IdleClients : public Load {
   void step(std::uint64_t) override {}
 
  protected:
+  // Counts what has come and throws it away. False: the server has closed.
+  bool drain(const RawModbus& client);
+
   std::vector<RawModbus> clients_;
 };
 
@@ -62,11 +68,10 @@ class PlayedLoad {
   ~PlayedLoad();
   PlayedLoad(const PlayedLoad&) = delete;
   PlayedLoad& operator=(const PlayedLoad&) = delete;
-  double steps_per_s() const;  // 1000 when the machine keeps up
+  double seconds() const;
 
  private:
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-  std::atomic<std::uint64_t> steps_ = 0;
   std::atomic<bool> stop_ = false;
   std::thread thread_;
 };
