@@ -1,4 +1,5 @@
 """tshark as a decoder that knows nothing of this house: what is common to its tests."""
+import os
 import shutil
 import subprocess
 import sys
@@ -18,9 +19,12 @@ def need(*programs):
 
 
 def tshark(path, *options):
-    """What it prints about a capture file. Raises CalledProcessError when it cannot read it."""
+    """What it prints about a capture file, whatever the user's own preferences. Raises CalledProcessError when it
+    cannot read it.
+    """
+    without_preferences = {**os.environ, "WIRESHARK_CONFIG_DIR": "/nonexistent"}
     return subprocess.run(["tshark", "-n", "-r", path, *options], check=True, text=True, stdout=subprocess.PIPE,
-                          stderr=subprocess.DEVNULL).stdout
+                          stderr=subprocess.DEVNULL, env=without_preferences).stdout
 
 
 def compare(seen, golden_path, update):
