@@ -345,8 +345,9 @@ TEST(Cell, TwoRobotsNeedTheirOwnPorts) {
   json["robots"][1]["name"] = "robot2";
   EXPECT_THAT(
       mistakes_in(json),
-      ElementsAre("cell.json: robots[1].link.unit: found 127.0.0.1:1502 unit 1, as in robots[0].link, expected a "
-                  "port or a unit id of its own for each robot"));
+      ElementsAre(
+          "cell.json: robots[1].link.unit: found 127.0.0.1:1502 unit 1, as in robots[0].link, expected a "
+          "port or a unit id of its own for each robot"));
   json["robots"][1]["link"]["address"] = "0.0.0.0";
   EXPECT_EQ(mistakes_in(json).size(), 1U);
   json["robots"][1]["link"]["address"] = "127.0.0.2";

@@ -1,5 +1,5 @@
-// A robot controller that is a Modbus TCP server with nothing but holding registers (shown as input registers too), and that can be told to
-// misbehave. Framing and unpacking are its own.
+// A robot controller that is a Modbus TCP server with nothing but holding registers (shown as input registers
+// too), and that can be told to misbehave. Framing and unpacking are its own.
 #pragma once
 
 #include <array>
