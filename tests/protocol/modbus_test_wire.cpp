@@ -96,11 +96,15 @@ class TestCell {
   std::thread thread_;
 };
 
+bool is_up(const ModbusRtuServer& server) { return server.counters().open; }
+bool is_up(const ModbusClientLink&) { return true; }  // its controller may come later
+
 template <class Wire, class Options>
 int serve(const Options& options) {
   TestCell cell;
   {
     const Wire wire(options, cell.endpoint());
+    while (!is_up(wire)) std::this_thread::sleep_for(milliseconds(1));
     std::cout << "ready" << std::endl;
     for (std::string line; std::getline(std::cin, line);) continue;
   }

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 from block import BUSY, MEASURE, SKIPPED, VALID, Block, command
 from wire import running, until
@@ -119,6 +120,7 @@ def disturbances(peer):
 def late_answer(peer, wire):
     """The daemon stands still for longer than its answer may take; the request waits in the line meanwhile."""
     os.kill(wire.pid, signal.SIGSTOP)
+    until(lambda: stopped(wire.pid), "the daemon stands still")
     serial = peer.client.socket
     serial.write(frame(UNIT, struct.pack(">BHH", 4, 0, 61)))
     time.sleep(0.8)
@@ -126,6 +128,13 @@ def late_answer(peer, wire):
     time.sleep(0.3)
     assert serial.in_waiting == 0, "a late answer"
     whole_handshake(peer, EXPECTED)
+
+
+def stopped(pid):
+    """All threads of a process stand still."""
+    states = [Path(f"/proc/{pid}/task/{task}/stat").read_text().rsplit(")", 1)[1].split()[0]
+              for task in os.listdir(f"/proc/{pid}/task")]
+    return all(state in "Tt" for state in states)
 
 
 def lost_device(line, wire_peer):
