@@ -113,22 +113,38 @@ NotifyListener::NotifyListener(const std::filesystem::path& socket)
   std::strncpy(address.sun_path, socket.c_str(), sizeof address.sun_path - 1);
   if (::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
     throw std::runtime_error("cannot bind " + socket.string());
+  thread_ = std::jthread([this](const std::stop_token& stop) { listen(stop); });
 }
 
-NotifyListener::~NotifyListener() { ::close(fd_); }
+NotifyListener::~NotifyListener() {
+  thread_.request_stop();
+  thread_.join();
+  ::close(fd_);
+}
 
-bool NotifyListener::heard(const std::string& line, std::chrono::milliseconds patience) {
-  const auto deadline = Clock::now() + patience;
-  for (;;) {
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+void NotifyListener::listen(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
     pollfd entry{fd_, POLLIN, 0};
-    if (left <= 0ms || ::poll(&entry, 1, static_cast<int>(left.count())) <= 0) return false;
+    if (::poll(&entry, 1, 50) <= 0) continue;
     char text[4096];
     const ssize_t size = ::recv(fd_, text, sizeof text, 0);
     std::istringstream message(std::string(text, size > 0 ? static_cast<std::size_t>(size) : 0));
-    for (std::string found; std::getline(message, found);)
-      if (found == line) return true;
+    const std::scoped_lock lock(mutex_);
+    for (std::string line; std::getline(message, line);) lines_.push_back(line);
+    came_.notify_all();
   }
+}
+
+bool NotifyListener::heard(const std::string& line, std::chrono::milliseconds patience) {
+  std::unique_lock lock(mutex_);
+  return came_.wait_for(lock, patience, [&] {
+    while (!lines_.empty()) {
+      const bool found = lines_.front() == line;
+      lines_.pop_front();
+      if (found) return true;
+    }
+    return false;
+  });
 }
 
 }  // namespace zeropose

@@ -4,9 +4,14 @@
 #include <sys/types.h>
 
 #include <chrono>
+#include <condition_variable>
+#include <deque>
 #include <filesystem>
+#include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace zeropose {
@@ -39,7 +44,8 @@ struct Finished {
 Finished run_program(const std::vector<std::string>& command,
                      std::chrono::seconds patience = std::chrono::seconds(60));
 
-// What systemd would hear on $NOTIFY_SOCKET.
+// What systemd would hear on $NOTIFY_SOCKET. Listens all the time, as systemd does: else a program that
+// speaks would wait for it.
 class NotifyListener {
  public:
   explicit NotifyListener(const std::filesystem::path& socket);
@@ -47,11 +53,17 @@ class NotifyListener {
   NotifyListener(const NotifyListener&) = delete;
   NotifyListener& operator=(const NotifyListener&) = delete;
 
-  // Waits until a message holds this line, e.g. "READY=1".
+  // Waits until a line like "READY=1" comes; true for each that came only once.
   bool heard(const std::string& line, std::chrono::milliseconds patience);
 
  private:
+  void listen(const std::stop_token& stop);
+
   int fd_ = -1;
+  std::mutex mutex_;
+  std::condition_variable came_;
+  std::deque<std::string> lines_;
+  std::jthread thread_;
 };
 
 }  // namespace zeropose
