@@ -82,7 +82,11 @@ void Recorder::check_sequence(const ResultBlock& b) {
   const auto key = std::pair(b.epoch, b.sequence);
   const auto [it, is_new] = by_sequence_.emplace(key, without_age(b));
   if (!is_new && it->second != without_age(b)) violation(b, "the same sequence number with another content");
-  if (by_sequence_.size() > remembered_sequences) by_sequence_.erase(by_sequence_.begin());
+  if (!is_new) return;
+  sequences_.push_back(key);  // the number wraps: the smallest is not the oldest
+  if (sequences_.size() <= remembered_sequences) return;
+  by_sequence_.erase(sequences_.front());
+  sequences_.pop_front();
 }
 
 void Recorder::check_valid(const ResultBlock& b, Clock::time_point read_started) {

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <atomic>
+#include <deque>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -76,6 +77,7 @@ class Recorder {
   mutable std::mutex mutex_;
   std::map<std::uint32_t, Known> known_;
   std::map<std::pair<std::uint32_t, std::uint16_t>, ResultBlock> by_sequence_;  // epoch, sequence
+  std::deque<std::pair<std::uint32_t, std::uint16_t>> sequences_;               // its keys, oldest first
   std::vector<std::string> violations_;
   std::size_t blocks_ = 0, valid_blocks_ = 0;
   std::atomic<bool> stopping_{false};
