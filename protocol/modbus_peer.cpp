@@ -98,16 +98,16 @@ std::string_view name_of(PeerProblem problem) {
   return "unknown";
 }
 
-struct ModbusPeer::Library {
+struct ModbusPeer::Session {
   Context context;
   bool connected = false;
   bool answer_may_come = false;  // to a question that was given up
 };
 
 ModbusPeer::ModbusPeer(const ModbusPeerOptions& options)
-    : options_(checked(options)), library_(std::make_unique<Library>()) {
-  library_->context = std::visit([](const auto& where) { return context_for(where); }, options.where);
-  modbus_t* const context = library_->context.get();
+    : options_(checked(options)), session_(std::make_unique<Session>()) {
+  session_->context = std::visit([](const auto& where) { return context_for(where); }, options.where);
+  modbus_t* const context = session_->context.get();
   if (context == nullptr || modbus_set_slave(context, options.unit) != 0)
     throw std::runtime_error("Modbus: " + name() + ": " + modbus_strerror(errno));
   const auto time = options.response_timeout.count();
@@ -122,12 +122,12 @@ ModbusPeer::ModbusPeer(const std::string& address, std::uint16_t port, std::uint
     : ModbusPeer(ModbusPeerOptions{ModbusTcpAddress{address, port}, unit, response_timeout}) {}
 
 ModbusPeer::~ModbusPeer() {
-  if (library_) close();
+  if (session_) close();
 }
 ModbusPeer::ModbusPeer(ModbusPeer&&) noexcept = default;
 ModbusPeer& ModbusPeer::operator=(ModbusPeer&& other) noexcept {
   std::swap(options_, other.options_);
-  std::swap(library_, other.library_);
+  std::swap(session_, other.session_);
   return *this;
 }
 
@@ -142,29 +142,29 @@ PeerFailure ModbusPeer::failure(PeerProblem problem, const std::string& what) co
   return {problem, 0, "Modbus: " + name() + ": " + what};
 }
 
-bool ModbusPeer::connected() const { return library_->connected; }
+bool ModbusPeer::connected() const { return session_->connected; }
 
 void ModbusPeer::close() {
-  if (!library_->connected) return;
-  modbus_close(library_->context.get());
-  library_->connected = false;
+  if (!session_->connected) return;
+  modbus_close(session_->context.get());
+  session_->connected = false;
 }
 
 std::optional<PeerFailure> ModbusPeer::connect() {
-  if (library_->connected) return std::nullopt;
-  modbus_t* const context = library_->context.get();
+  if (session_->connected) return std::nullopt;
+  modbus_t* const context = session_->context.get();
   if (modbus_connect(context) != 0)
     return failure(PeerProblem::cannot_connect, std::string("cannot connect (") + modbus_strerror(errno) +
                                                     "); is the device on, and are the settings its own?");
-  library_->connected = true;
+  session_->connected = true;
   if (std::holds_alternative<ModbusTcpAddress>(options_.where)) return std::nullopt;
   modbus_flush(context);
-  if (library_->answer_may_come && !wait_for_silence(modbus_get_socket(context), options_.response_timeout)) {
+  if (session_->answer_may_come && !wait_for_silence(modbus_get_socket(context), options_.response_timeout)) {
     close();
     return failure(PeerProblem::cannot_connect,
                    "the line does not become quiet; is another master on it, or another speed set?");
   }
-  library_->answer_may_come = false;
+  session_->answer_may_come = false;
   return std::nullopt;
 }
 
@@ -176,7 +176,7 @@ PeerFailure ModbusPeer::failure_of_errno() {
     refused.exception = static_cast<std::uint8_t>(error - MODBUS_ENOBASE);
     return refused;
   }
-  library_->answer_may_come = true;
+  session_->answer_may_come = true;
   close();
   if (problem == PeerProblem::no_answer)
     return failure(problem, "no answer within " + std::to_string(options_.response_timeout.count()) +
@@ -185,10 +185,10 @@ PeerFailure ModbusPeer::failure_of_errno() {
 }
 
 RegisterAnswer ModbusPeer::read(std::uint16_t first, std::uint16_t count, bool holding) {
-  if (!library_->connected) return {failure(PeerProblem::not_connected, "not connected"), {}};
+  if (!session_->connected) return {failure(PeerProblem::not_connected, "not connected"), {}};
   std::vector<std::uint16_t> registers(count);
   const auto call = holding ? modbus_read_registers : modbus_read_input_registers;
-  if (call(library_->context.get(), first, count, registers.data()) != count) return {failure_of_errno(), {}};
+  if (call(session_->context.get(), first, count, registers.data()) != count) return {failure_of_errno(), {}};
   return {std::nullopt, std::move(registers)};
 }
 
@@ -201,9 +201,9 @@ RegisterAnswer ModbusPeer::read_holding(std::uint16_t first, std::uint16_t count
 }
 
 std::optional<PeerFailure> ModbusPeer::write(std::uint16_t first, std::span<const std::uint16_t> registers) {
-  if (!library_->connected) return failure(PeerProblem::not_connected, "not connected");
+  if (!session_->connected) return failure(PeerProblem::not_connected, "not connected");
   const auto count = static_cast<int>(registers.size());
-  if (modbus_write_registers(library_->context.get(), first, count, registers.data()) == count)
+  if (modbus_write_registers(session_->context.get(), first, count, registers.data()) == count)
     return std::nullopt;
   return failure_of_errno();
 }

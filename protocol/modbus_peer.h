@@ -86,14 +86,14 @@ class ModbusPeer {
   std::optional<PeerFailure> write_command(const Command& command);
 
  private:
-  struct Library;
+  struct Session;
   RegisterAnswer read(std::uint16_t first, std::uint16_t count, bool holding);
   PeerFailure failure(PeerProblem problem, const std::string& what) const;
   PeerFailure failure_of_errno();
   std::string name() const;
 
   ModbusPeerOptions options_;
-  std::unique_ptr<Library> library_;
+  std::unique_ptr<Session> session_;
 };
 
 }  // namespace zeropose
