@@ -13,25 +13,28 @@
 
 namespace zeropose {
 
+inline CellState ready_cell() { return {true, true, true, true, 0x11111111, 0x22222222, 0x33333333}; }
+
 class EndpointTest : public testing::Test {
  protected:
   EndpointTest() : recorder({Convention::kuka, 3, default_result_data_id}) {
     endpoint_options.handshake.convention = Convention::kuka;
     endpoint_options.handshake.frame = 3;
     endpoint_options.handshake.robot_index = 3;
-    endpoint_options.tap = [this](const ResultBlock& block) {
-      recorder.see(encode(block), Recorder::Clock::now());
-    };
+    endpoint_options.tap = recorder.tap();
   }
   ~EndpointTest() override { EXPECT_EQ(recorder.violations(), std::vector<std::string>()); }
 
   void make_endpoint() {
-    endpoint.emplace(endpoint_options, [this](const Request& request) {
+    make_endpoint([this](const Request& request) {
       const std::scoped_lock lock(mutex);
       requests.push_back(request);
       came.notify_all();
     });
-    endpoint->set_cell_state({true, true, true, true, 0x11111111, 0x22222222, 0x33333333});
+  }
+  void make_endpoint(RequestHandler handler) {
+    endpoint.emplace(endpoint_options, std::move(handler));
+    endpoint->set_cell_state(ready_cell());
   }
 
   std::optional<Request> next_request() {
@@ -55,6 +58,8 @@ class EndpointTest : public testing::Test {
     report.correction = from_six_numbers({1.5, -2.25, 0.5 + request.id, 0.1, -0.2, 0.3});
     report.effective_marks = 12;
     report.effective_cameras = 4;
+    report.largest_deviation_mm = 0.1;
+    report.sigma_mm = 0.02;
     return report;
   }
   void publish(const Report& report) {

@@ -101,7 +101,7 @@ TEST_F(LinkTest, SimplePlcWithoutCrc) {
 TEST_F(LinkTest, OtherDataIds) {
   served.unit.result_data_id = 0x1111;
   served.unit.command_data_id = 0x2222;
-  watched = false;
+  endpoint_options.tap = nullptr;
   start();
   RawModbus client(server->port());
   const auto registers = client.read_registers();
