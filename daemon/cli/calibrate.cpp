@@ -1,0 +1,18 @@
+#include "daemon/cli/calibrate.h"
+
+#include "daemon/cli/calibrate_help.h"
+#include "daemon/cli/calibrate_views.h"
+
+namespace zeropose {
+
+void add_calibrate(CLI::App& app, int& exit_status) {
+  CLI::App* verb = app.add_subcommand("calibrate", "Calibrates cameras; --help says which method when");
+  verb->require_subcommand(1);
+  verb->footer(cli::calibrate_help);
+  add_calibrate_points(*verb, exit_status);
+  add_calibrate_views(*verb, exit_status);
+  add_calibrate_vanishing(*verb, exit_status);
+  add_calibrate_pose(*verb, exit_status);
+}
+
+}  // namespace zeropose
