@@ -15,17 +15,12 @@
 #include "sim/scene.h"
 #include "sim/wrong_calibration.h"
 #include "tests/support/cell_scene.h"
+#include "tests/support/sanitized.h"
 
 namespace zeropose {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool sanitized = true;
-#else
-constexpr bool sanitized = false;
-#endif
-
-bool quick() { return sanitized || std::getenv("ZEROPOSE_QUICK") != nullptr; }
+bool quick() { return test::sanitized || std::getenv("ZEROPOSE_QUICK") != nullptr; }
 
 using CleanPictures = std::vector<std::vector<float>>;  // one per camera
 

@@ -8,6 +8,7 @@
 #include "config/cell.h"
 #include "sim/scene.h"
 #include "tests/support/rendered_pictures.h"
+#include "tests/support/sanitized.h"
 
 namespace zeropose {
 namespace {
@@ -114,7 +115,7 @@ TEST_F(ImageFaults, Saturated) {
 }
 
 TEST_F(ImageFaults, Blurred) {
-  for (std::size_t camera = 0; camera < 4; ++camera)
+  for (std::size_t camera = 0; camera < static_cast<std::size_t>(test::trials(4)); ++camera)
     for (const double sigma_px : {5.0, 8.0, 12.0}) {
       pictures = *clean_;
       pictures[camera] = blurred(pictures[camera], model(camera), sigma_px);

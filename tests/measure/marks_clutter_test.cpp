@@ -8,6 +8,7 @@
 
 #include "measure/marks.h"
 #include "tests/support/mark_picture.h"
+#include "tests/support/sanitized.h"
 
 namespace zeropose {
 namespace {
@@ -42,7 +43,7 @@ Window window_of(int seed, std::mt19937_64& random) {
 TEST(MarksInClutter, NothingIsTakenForACoveredMark) {
   std::mt19937_64 random(21);
   int with_structure = 0;
-  for (int seed = 0; seed < 600; ++seed) {
+  for (int seed = 0; seed < test::trials(600); ++seed) {
     Window window = window_of(seed, random);
     add_clutter(window.drawing, smallest, largest, 0, random);
     const auto pixels = expose(paint(window.drawing), 2, random);
@@ -52,14 +53,14 @@ TEST(MarksInClutter, NothingIsTakenForACoveredMark) {
         << finding.axis_ratio << " contrast " << finding.contrast << " quality " << finding.quality;
     with_structure += finding.status != MarkStatus::low_contrast ? 1 : 0;
   }
-  EXPECT_GT(with_structure, 500);
+  EXPECT_GT(with_structure, test::trials(500));
 }
 
 // Bolts: hexagons of a mark's size, down to the contrast that a mark needs.
 TEST(MarksInClutter, HexagonsAreNotDiscs) {
   std::mt19937_64 random(23);
   std::uniform_real_distribution<double> unit(0, 1);
-  for (int seed = 0; seed < 200; ++seed) {
+  for (int seed = 0; seed < test::trials(200); ++seed) {
     Window window = window_of(1, random);
     const double radius = 10 + 18 * unit(random), turn = unit(random);
     const double contrast = seed % 2 == 0 ? 16 : 16 + 60 * unit(random);
