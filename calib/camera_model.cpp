@@ -86,6 +86,7 @@ std::optional<Vector2d> undistort(const BrownConrady& lens, const Vector2d& d) {
 CalibratedCamera virtual_camera(const CalibratedCamera& camera_in_hand, const Pose& X_RH) {
   CalibratedCamera camera = camera_in_hand;
   camera.X_WC = X_RH * camera_in_hand.X_WC;
+  camera.on_hand = false;
   return camera;
 }
 

@@ -37,6 +37,7 @@ struct CalibratedCamera {
   std::string name;
   CameraModel model;
   Pose X_WC = Pose::Identity();
+  bool on_hand = false;  // of a robot: X_WC is X_HC
 };
 
 // A camera on a robot's hand is another camera at each position of the robot: where the given one, calibrated

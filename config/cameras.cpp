@@ -39,6 +39,9 @@ Distortion read_distortion(JsonObject& camera) {
   return brown;
 }
 
+// Of a camera on a robot's hand it is the pose there.
+const char* pose_key(bool on_hand) { return on_hand ? "X_HC" : "X_WC"; }
+
 nlohmann::ordered_json six_json(const Pose& X_AB) {
   const SixNumbers six = to_six_numbers(X_AB);
   return {six.x_mm, six.y_mm, six.z_mm, six.rx_deg, six.ry_deg, six.rz_deg};
@@ -65,7 +68,7 @@ nlohmann::ordered_json camera_json(const CalibratedCamera& camera) {
     json["p2"] = brown.p2;
     json["k3"] = brown.k3;
   }
-  json["X_WC"] = six_json(camera.X_WC);
+  json[pose_key(camera.on_hand)] = six_json(camera.X_WC);
   return json;
 }
 
@@ -86,7 +89,8 @@ CameraModel read_model(JsonObject& camera) {
 CalibratedCamera read_camera(JsonObject& camera) {
   CalibratedCamera read;
   read.model = read_model(camera);
-  camera.read("X_WC", read.X_WC);
+  read.on_hand = camera.has(pose_key(true));
+  camera.read(pose_key(read.on_hand), read.X_WC);
   return read;
 }
 
@@ -125,7 +129,7 @@ std::string cameras_text(const std::vector<CalibratedCamera>& cameras) {
 
 std::string camera_text(const CalibratedCamera& camera, bool with_pose) {
   nlohmann::ordered_json json = camera_json(camera);
-  if (!with_pose) json.erase("X_WC");
+  if (!with_pose) json.erase(pose_key(camera.on_hand));
   return json.dump();
 }
 

@@ -10,6 +10,7 @@
 #include "config/cell_checks.h"
 #include "config/files.h"
 #include "config/ipv4.h"
+#include "config/job_reader.h"
 #include "config/json_reader.h"
 #include "config/robot_link.h"
 #include "config/text.h"
@@ -17,13 +18,6 @@
 namespace zeropose {
 namespace {
 
-constexpr double largest_mm = 1e6;
-// In pairs of one kind, dark and bright.
-constexpr std::array<std::string_view, 10> mark_kind_names{
-    "dark_disc",   "bright_disc", "dark_ring",   "bright_ring", "dark_ball",
-    "bright_ball", "dark_slot",   "bright_slot", "dark_cross",  "bright_cross"};
-constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring, MarkKind::ball, MarkKind::slot,
-                                MarkKind::cross};
 constexpr std::array<std::string_view, 4> frame_names{"object_zero", "world_shift", "robot_base_shift",
                                                       "user_frame"};
 
@@ -33,139 +27,12 @@ void read_milliseconds(JsonObject& object, std::string_view key, std::chrono::mi
   if (object.read_optional(key, count, min, max)) value = std::chrono::milliseconds(count);
 }
 
-// A direction of length 1 within 1 %, then exactly 1.
-void take_direction(JsonObject& object, std::string_view key, const Eigen::Vector3d& given,
-                    Eigen::Vector3d& direction) {
-  if (std::abs(given.norm() - 1) > 0.01)
-    object.add_mistake(key, concat({"a vector of length ", std::to_string(given.norm())}),
-                       "a unit vector (length 0.99 to 1.01)");
-  else
-    direction = given.normalized();
-}
-
-void read_normal(JsonObject& object, Eigen::Vector3d& normal_O) {
-  Eigen::Vector3d given;
-  if (object.read_optional("normal", given, 2.0)) take_direction(object, "normal", given, normal_O);
-}
-
-// The cameras of a mark by name; indices are found once the file is read.
-struct NamedMark {
-  Mark mark;
-  std::vector<std::string> cameras;
-};
-
-// A ring has a circle inside, other marks have none.
-void read_inner_radius(JsonObject& object, Mark& mark) {
-  double radius_mm = 0;
-  const bool given = object.read_optional("inner_radius_mm", radius_mm, NumberRange{0, 1000, true});
-  const bool ring = mark.kind == MarkKind::ring;
-  if (ring && !(radius_mm > 0 && radius_mm < mark.radius_mm))
-    object.add_mistake("inner_radius_mm", given ? "a radius not below radius_mm" : "a ring without it",
-                       "the radius of the ring's inner circle, mm, below radius_mm");
-  if (!ring && given) object.add_mistake("inner_radius_mm", "a mark that is no ring", "no such key");
-  if (ring) mark.inner_radii_mm = {radius_mm};
-}
-
-// What a mark and a reference point have in common; the inner radius is read after the radius.
-NamedMark read_look(JsonObject& object) {
-  NamedMark named;
-  Mark& mark = named.mark;
-  std::size_t kind = 0;
-  object.read("name", mark.name);
-  object.read("cameras", named.cameras);
-  if (object.read_word("kind", mark_kind_names, kind)) {
-    mark.kind = mark_kinds[kind / 2];
-    mark.bright = kind % 2 == 1;
-  }
-  read_normal(object, mark.normal_O);
-  object.read_optional("radius_mm", mark.radius_mm, NumberRange{0, 1000, true});
-  read_inner_radius(object, mark);
-  return named;
-}
-
-NamedMark read_mark(JsonObject& object) {
-  NamedMark named = read_look(object);
-  Mark& mark = named.mark;
-  object.read("position_mm", mark.p_O_mm, largest_mm);
-  object.read_optional("weight", mark.weight, NumberRange{0, 1});
-  object.read_optional("tolerance_px", mark.tolerance_px, NumberRange{0, 1000, true});
-  object.read_optional("tolerance_mm", mark.tolerance_mm, NumberRange{0, 1000, true});
-  object.read_optional("sigma_mm", mark.sigma_mm, NumberRange{0, 100});
-  return named;
-}
-
-void read_requirements(JsonObject& object, Requirements& requirements) {
-  object.read("min_marks", requirements.min_marks, 2, 10000);
-  object.read_optional("min_marks_per_camera", requirements.min_marks_per_camera, 0, 10000);
-  object.read_optional("min_cameras", requirements.min_cameras, 1, 1000);
-  object.read("max_sigma_mm", requirements.max_sigma_mm, NumberRange{0, 100, true});
-  object.read_optional("max_hidden_mm", requirements.max_hidden_mm, NumberRange{0, 1000, true});
-  object.read_optional("max_compensation_mm", requirements.max_compensation_mm, NumberRange{0, 100});
-  object.read_optional("max_displacement_mm", requirements.max_displacement_mm, NumberRange{0, 10000});
-  object.read_optional("max_step_mm", requirements.max_step_mm, NumberRange{0, 10000});
-  object.read_optional("max_step_deg", requirements.max_step_deg, NumberRange{0, 180});
-}
-
-void read_limits(JsonObject& object, std::array<Range, 6>& limits) {
-  constexpr std::array keys{"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"};
-  for (std::size_t i = 0; i < keys.size(); ++i)
-    object.read_range(keys[i], limits[i].min, limits[i].max, i < 3 ? 10000 : 180);
-}
-
-ApplicationPoint read_application_point(JsonObject& object) {
-  ApplicationPoint point;
-  object.read("name", point.name);
-  object.read("position_mm", point.p_O_mm, largest_mm);
-  return point;
-}
-
-// Turns the names of the cameras of the mark of this index into views.
-void add_views(JsonObject& object, const NamedMark& named, const std::vector<CameraOptions>& cameras,
-               std::size_t index, std::vector<View>& views) {
-  if (object.has("cameras") && named.cameras.empty())
-    object.add_mistake("cameras", "no camera", "at least one name of a camera of this cell");
-  for (std::size_t i = 0; i < named.cameras.size(); ++i) {
-    const std::string& name = named.cameras[i];
-    const std::string key = path_of("cameras", i);
-    const auto camera = std::ranges::find(cameras, name, &CameraOptions::name);
-    if (camera == cameras.end())
-      object.add_mistake(key, in_quotes(name), "the name of a camera of this cell");
-    else if (std::find(named.cameras.begin(), named.cameras.begin() + static_cast<std::ptrdiff_t>(i), name) !=
-             named.cameras.begin() + static_cast<std::ptrdiff_t>(i))
-      object.add_mistake(key, in_quotes(name) + " twice", "each camera once");
-    else
-      views.push_back({static_cast<std::size_t>(camera - cameras.begin()), index});
-  }
-}
-
-Job read_job(JsonObject& object, const std::vector<CameraOptions>& cameras) {
-  Job job;
-  object.read("name", job.name);
-  object.read("number", job.number, 1, 65535);
-  object.read("nominal_pose", job.X_WO_nominal);
-  Pose X_WP = Pose::Identity();
-  if (object.read_optional("planar", X_WP)) job.X_WP_planar = X_WP;
-  object.read("search_mm", job.search_mm, NumberRange{0, 10000, true});
-  object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
-  object.read_each("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
-    const NamedMark named = read_mark(member);
-    add_views(member, named, cameras, job.marks.size(), job.views);
-    job.marks.push_back(named.mark);
-  });
-  object.read_each("application_points", 1, [&](JsonObject& member) {
-    job.application_points.push_back(read_application_point(member));
-  });
-  object.read("requirements", [&](JsonObject& member) { read_requirements(member, job.requirements); });
-  object.read("limits", [&](JsonObject& member) { read_limits(member, job.requirements.limits); });
-  return job;
-}
-
 // Coordinates in the world, else where its only camera saw it and how large.
 ReferencePoint read_reference_place(JsonObject& object, const NamedMark& named) {
   ReferencePoint point;
   point.mark = named.mark;
   object.read_optional("group", point.group);
-  const bool known = object.read_optional("position_mm", point.mark.p_O_mm, largest_mm);
+  const bool known = object.read_optional("position_mm", point.mark.p_O_mm, largest_coordinate_mm);
   std::array<double, 2> taught_px{};
   const bool taught = object.read_optional("pixel", std::span<double>(taught_px), 65535.0);
   object.read_optional("diameter_px", point.taught_diameter_px, NumberRange{0, 65535, true});
@@ -194,10 +61,10 @@ void read_reference_check(JsonObject& object, References& references) {
   object.read_optional("suspicious_blocks", references.suspicious_blocks);
 }
 
-void read_references(JsonObject& object, Cell& cell) {
+void read_references(JsonObject& object, const Eyes& eyes, Cell& cell) {
   object.read_each_optional("reference_points", [&](JsonObject& member) {
     const NamedMark named = read_look(member);
-    add_views(member, named, cell.cameras, cell.references.points.size(), cell.references.views);
+    add_views(member, named, eyes, cell.references.points.size(), cell.references.views);
     cell.references.points.push_back(read_reference_place(member, named));
   });
   object.read_optional("reference_check",
@@ -208,7 +75,7 @@ LinearAxis read_axis(JsonObject& object) {
   LinearAxis axis;
   Eigen::Vector3d given;
   if (object.read("direction", given, 2.0)) take_direction(object, "direction", given, axis.direction_W);
-  object.read("zero_mm", axis.zero_mm, NumberRange{-largest_mm, largest_mm});
+  object.read("zero_mm", axis.zero_mm, NumberRange{-largest_coordinate_mm, largest_coordinate_mm});
   return axis;
 }
 
@@ -241,6 +108,20 @@ void read_timing(JsonObject& object, Cell& cell) {
   read_milliseconds(object, "zero_deadline_ms", cell.zero_deadline, 50, 600000);
 }
 
+// Which robot carries which camera, once both are read.
+void find_hands(JsonObject& object, const std::vector<Mounted>& cameras, Cell& cell) {
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    cell.hand_of.emplace_back();
+    if (cameras[i].robot.empty()) continue;
+    const auto robot = std::ranges::find(cell.robots, cameras[i].robot, &RobotOptions::name);
+    if (robot == cell.robots.end())
+      object.add_mistake(path_of("cameras", i) + ".on_hand_of", in_quotes(cameras[i].robot),
+                         "the name of a robot of this cell");
+    else
+      cell.hand_of[i] = static_cast<std::size_t>(robot - cell.robots.begin());
+  }
+}
+
 // Returns the value of "calibration".
 std::string read_cell(JsonObject& object, Cell& cell) {
   std::string calibration, ignored;
@@ -248,12 +129,16 @@ std::string read_cell(JsonObject& object, Cell& cell) {
   object.read("name", cell.name);
   object.read_optional("simulated", cell.simulated);
   object.read("calibration", calibration);
-  object.read_each("cameras", 1,
-                   [&](JsonObject& member) { cell.cameras.push_back(read_camera_options(member)); });
-  object.read_each("jobs", 1,
-                   [&](JsonObject& member) { cell.jobs.push_back(read_job(member, cell.cameras)); });
-  read_references(object, cell);
+  std::vector<Mounted> mounted;
+  object.read_each("cameras", 1, [&](JsonObject& member) {
+    cell.cameras.push_back(read_camera_options(member));
+    mounted.push_back({cell.cameras.back().name, ""});
+    member.read_optional("on_hand_of", mounted.back().robot);
+  });
+  object.read_each("jobs", 1, [&](JsonObject& member) { cell.jobs.push_back(read_job(member, mounted)); });
+  read_references(object, fixed_eyes(mounted), cell);
   object.read_each("robots", 0, [&](JsonObject& member) { cell.robots.push_back(read_robot(member)); });
+  find_hands(object, mounted, cell);
   object.read_optional("timing", [&](JsonObject& member) { read_timing(member, cell); });
   return calibration;
 }
@@ -285,7 +170,7 @@ void add_calibration(Cell& cell, const std::string& text, const std::string& nam
   try {
     const std::vector<CalibratedCamera> calibrated = parse_cameras(text, name);
     JsonReading reading(name);
-    cell.calibration = calibration_in_order(cell.cameras, calibrated, reading);
+    cell.calibration = calibration_in_order(cell, calibrated, reading);
     append(mistakes, reading.mistakes());
   } catch (const ConfigError& error) {
     append(mistakes, error.mistakes());
@@ -330,6 +215,24 @@ Cell load_cell(const std::filesystem::path& path) {
   for (CameraOptions& camera : cell.cameras)
     if (camera.driver == CameraDriver::folder) camera.folder.path = path.parent_path() / camera.folder.path;
   return cell;
+}
+
+std::vector<CalibratedCamera> cameras_for(const Cell& cell, const Job& job, std::span<const Pose> X_RH) {
+  std::vector<CalibratedCamera> cameras = cell.calibration;
+  for (std::size_t i = 0; i < job.positions.size(); ++i) {
+    const HandPosition& position = job.positions[i];
+    const Pose& X_WR = cell.robots.at(cell.hand_of.at(position.camera).value()).X_WR;
+    cameras.push_back(virtual_camera(cell.calibration.at(position.camera),
+                                     X_WR * (X_RH.empty() ? position.X_RH : X_RH[i])));
+    cameras.back().name = camera_name(cell, job, cell.cameras.size() + i);
+  }
+  return cameras;
+}
+
+std::string camera_name(const Cell& cell, const Job& job, std::size_t view_camera) {
+  const std::string& device = cell.cameras.at(device_of(job, view_camera, cell.cameras.size())).name;
+  if (view_camera < cell.cameras.size()) return device;
+  return device + " at " + job.positions[view_camera - cell.cameras.size()].name;
 }
 
 std::set<std::string> known_cell_keys() {

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,7 +34,8 @@ struct Cell {
   std::string name;
   bool simulated = false;
   std::vector<CameraOptions> cameras;
-  std::vector<CalibratedCamera> calibration;  // same order as cameras
+  std::vector<CalibratedCamera> calibration;        // same order as cameras
+  std::vector<std::optional<std::size_t>> hand_of;  // likewise: the robot that carries it; none: it is fixed
   std::vector<Job> jobs;
   References references;  // without points: no camera is checked
   std::vector<RobotOptions> robots;
@@ -54,6 +56,14 @@ struct CellText {
   std::string calibration, calibration_name;
 };
 Cell parse_cell(const CellText& text);
+
+// The cameras that a job sees with, as View::camera counts them: the cell's, then one for each of the job's
+// positions with the robot's hand at X_RH, by default where it was taught. A camera on a hand has no place in
+// the world of its own.
+std::vector<CalibratedCamera> cameras_for(const Cell& cell, const Job& job, std::span<const Pose> X_RH = {});
+
+// The name of a view's camera.
+std::string camera_name(const Cell& cell, const Job& job, std::size_t view_camera);
 
 // Every key that a cell file may have, as "jobs[].marks[].name": what the loader asks for, to compare with
 // config/cell.schema.json.

@@ -63,8 +63,7 @@ void check_plane(const Job& job, const std::string& path, JsonReading& reading) 
                         "one that lies in the plane of planar (its z, rx and ry are 0 there)");
 }
 
-void check_requirements(const Job& job, const std::string& path, const std::vector<CameraOptions>& cameras,
-                        JsonReading& reading) {
+void check_requirements(const Cell& cell, const Job& job, const std::string& path, JsonReading& reading) {
   const Requirements& needed = job.requirements;
   if (needed.min_marks < least_marks(job))
     reading.add_mistake(path + ".requirements.min_marks", std::to_string(needed.min_marks),
@@ -85,7 +84,7 @@ void check_requirements(const Job& job, const std::string& path, const std::vect
       reading.add_mistake(path + ".requirements.min_marks_per_camera",
                           std::to_string(needed.min_marks_per_camera),
                           concat({"at most the ", std::to_string(count), " marks with a weight above 0 of ",
-                                  in_quotes(cameras[camera].name)}));
+                                  in_quotes(camera_name(cell, job, camera))}));
 }
 
 void check_jobs(const Cell& cell, JsonReading& reading) {
@@ -96,10 +95,11 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
   for (std::size_t i = 0; i < cell.jobs.size(); ++i) {
     const std::string path = path_of("jobs", i);
     check_unique(cell.jobs[i].marks, path + ".marks", "name", name_in_quotes, reading);
+    check_unique(cell.jobs[i].positions, path + ".positions", "name", name_in_quotes, reading);
     check_unique(cell.jobs[i].application_points, path + ".application_points", "name", name_in_quotes,
                  reading);
     check_plane(cell.jobs[i], path, reading);
-    check_requirements(cell.jobs[i], path, cell.cameras, reading);
+    check_requirements(cell, cell.jobs[i], path, reading);
   }
 }
 
@@ -242,6 +242,17 @@ void check_robots(const Cell& cell, JsonReading& reading) {
   }
 }
 
+// Where the hand is comes with AtPosition, which CAN does not carry and which has no place for the axis.
+void check_hands(const Cell& cell, JsonReading& reading) {
+  for (std::size_t i = 0; i < cell.hand_of.size(); ++i) {
+    if (!cell.hand_of[i]) continue;
+    const RobotOptions& robot = cell.robots[*cell.hand_of[i]];
+    if (std::holds_alternative<CanOptions>(robot.link) || robot.axis)
+      reading.add_mistake(path_of("cameras", i) + ".on_hand_of", in_quotes(robot.name),
+                          "a robot without a linear axis, on a link other than can");
+  }
+}
+
 bool reaches_corners(const CameraModel& model) {
   for (const double u : {-0.5, model.width_px - 0.5})
     for (const double v : {-0.5, model.height_px - 0.5})
@@ -265,6 +276,7 @@ void check_cell(const Cell& cell, JsonReading& reading) {
       },
       reading);
   check_robots(cell, reading);
+  check_hands(cell, reading);
   if (cell.zero_deadline < cell.deadline)
     reading.add_mistake("timing.zero_deadline_ms", std::to_string(cell.zero_deadline.count()),
                         concat({"at least deadline_ms, ", std::to_string(cell.deadline.count())}));
@@ -296,17 +308,22 @@ void put_references_in_place(Cell& cell, JsonReading& reading) {
   }
 }
 
-std::vector<CalibratedCamera> calibration_in_order(std::span<const CameraOptions> cameras,
+std::vector<CalibratedCamera> calibration_in_order(const Cell& cell,
                                                    std::span<const CalibratedCamera> calibrated,
                                                    JsonReading& reading) {
   std::vector<CalibratedCamera> ordered;
-  for (const CameraOptions& camera : cameras) {
+  for (std::size_t i = 0; i < cell.cameras.size(); ++i) {
+    const CameraOptions& camera = cell.cameras[i];
     if (camera.name.empty()) continue;
     const auto found = std::ranges::find(calibrated, camera.name, &CalibratedCamera::name);
     if (found == calibrated.end()) {
       reading.add_mistake(camera.name, "no such key", "the calibration of this camera of the cell");
       continue;
     }
+    if (found->on_hand != cell.hand_of[i].has_value())
+      reading.add_mistake(camera.name, found->on_hand ? "X_HC" : "X_WC",
+                          found->on_hand ? "X_WC, since the cell has the camera fixed"
+                                         : "X_HC, since the camera is on the hand of a robot");
     const CameraModel& model = found->model;
     const bool size_known = camera.width_px > 0 && camera.height_px > 0;
     if (size_known && (model.width_px != camera.width_px || model.height_px != camera.height_px))

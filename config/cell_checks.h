@@ -18,8 +18,9 @@ void check_cell(const Cell& cell, JsonReading& reading);
 void put_references_in_place(Cell& cell, JsonReading& reading);
 
 // The calibration of each camera of the cell, in the cell's order. Mistakes: a camera without calibration, of
-// another image size, with a lens model that does not reach its corners.
-std::vector<CalibratedCamera> calibration_in_order(std::span<const CameraOptions> cameras,
+// another image size, with a pose of the wrong kind (in the world or on a hand), with a lens model that does
+// not reach its corners.
+std::vector<CalibratedCamera> calibration_in_order(const Cell& cell,
                                                    std::span<const CalibratedCamera> calibrated,
                                                    JsonReading& reading);
 

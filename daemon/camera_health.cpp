@@ -19,13 +19,13 @@ void follow(HealthTrend& trend, double value, const std::string& camera, const c
 void follow_health(std::vector<CameraHealth>& health, std::span<const CameraImage> images,
                    const Measurement& measurement, const Job& job, const Cell& cell) {
   for (std::size_t i = 0; i < images.size() && i < measurement.health.size(); ++i) {
-    const std::size_t camera = images[i].camera;
+    const std::size_t camera = device_of(job, images[i].camera, cell.cameras.size());
     CameraHealth& known = health.at(camera);
     const std::string& name = cell.cameras[camera].name;
     known.seen = true;
     known.picture = measurement.health[i];
     follow(known.noise, known.picture.noise_grey, name, "the noise of its pictures (grey levels)");
-    if (const auto blur_px = mark_blur_px(measurement.findings, job, camera))
+    if (const auto blur_px = mark_blur_px(measurement.findings, job, images[i].camera))
       follow(known.focus, *blur_px, name, "the focus (blur of its marks, px)");
   }
 }

@@ -106,7 +106,7 @@ Json status_answer(Cycle& cycle) {
 Json mark_json(const Job& job, const Cell& cell, const Measurement& m, std::size_t view) {
   const MarkFinding& finding = m.findings[view];
   return {{"mark", job.marks[job.views[view].mark].name},
-          {"camera", cell.cameras[job.views[view].camera].name},
+          {"camera", camera_name(cell, job, job.views[view].camera)},
           {"finding", name_of(finding.status)},
           {"u_px", finding.u_px.x()},
           {"v_px", finding.u_px.y()}};

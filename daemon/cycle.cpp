@@ -12,22 +12,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto idle_period = 100ms;     // how often the cell's state is looked at when nothing is asked
-constexpr auto compute_reserve = 25ms;  // of the deadline, kept for measuring and publishing
-
-std::vector<std::size_t> cameras_of(const Job& job) {
-  std::vector<std::size_t> cameras;
-  for (const View& view : job.views) cameras.push_back(view.camera);
-  std::sort(cameras.begin(), cameras.end());
-  cameras.erase(std::unique(cameras.begin(), cameras.end()), cameras.end());
-  return cameras;
-}
-
-std::vector<CameraImage> images_of(std::span<const std::size_t> cameras, std::span<const Frame> frames) {
-  std::vector<CameraImage> images;
-  for (std::size_t i = 0; i < cameras.size(); ++i) images.push_back({cameras[i], view_of(frames[i])});
-  return images;
-}
+constexpr auto idle_period = 100ms;  // how often the cell's state is looked at when nothing is asked
 
 // Where the robot's base stands as the request says. Without an axis the argument means nothing.
 Pose base_of(const RobotOptions& robot, const Request& request) {
@@ -46,13 +31,7 @@ long microseconds(std::chrono::nanoseconds time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time).count();
 }
 
-std::string hex(std::uint32_t number) { return fmt::format("{:08x}", number); }
-
 }  // namespace
-
-ImageView view_of(const Frame& frame) {
-  return {frame.pixels.get(), frame.width_px, frame.height_px, frame.stride_bytes, frame.white};
-}
 
 Cycle::Cycle(Cell cell, std::filesystem::path state)
     : cell_(std::move(cell)), state_(std::move(state)), grabber_(cell_.cameras) {
@@ -61,18 +40,6 @@ Cycle::Cycle(Cell cell, std::filesystem::path state)
 }
 
 Cycle::~Cycle() { stop(); }
-
-// A zero that cannot be used is no reason not to run: the cell is not ready and says so.
-void Cycle::load_zeros() {
-  std::filesystem::create_directories(state_);
-  for (const Job& job : cell_.jobs) {
-    const StoredZero& zero = zeros_.emplace_back(load_zero_for(state_, cell_, job));
-    if (zero.record)
-      spdlog::info("job {}: zero {} of {}", job.name, hex(zero.record->id), zero.record->time_utc);
-    else
-      spdlog::warn("{}; take a new zero", zero.reason);
-  }
-}
 
 void Cycle::start() {
   last_progress_ = Clock::now();
@@ -153,9 +120,8 @@ void Cycle::refresh() {
   }
   CellState cell;
   cell.config_valid = true;
-  const auto cameras = cameras_of(job);
-  cell.cameras_alive = std::all_of(cameras.begin(), cameras.end(), [&now](std::size_t i) {
-    return now.cameras[i].state == CameraState::alive;
+  cell.cameras_alive = std::ranges::all_of(eyes_of(cell_, job), [&](std::size_t eye) {
+    return now.cameras[device_of(job, eye, cell_.cameras.size())].state == CameraState::alive;
   });
   cell.zero_valid = now.zero.has_value();
   cell.camera_moved = a_camera_moved();
@@ -209,6 +175,7 @@ void Cycle::carry_out(const Request& request) {
       reset_waits_ = false;
     }
     X_O0O_last_.reset();
+    hands_.forget();
     return refresh();
   }
   Report report;
@@ -237,7 +204,7 @@ Report Cycle::report_for(const Request& request) {
       }
       RobotLink& link = *links_.at(request.robot);
       const RobotOptions& robot = cell_.robots.at(request.robot);
-      const auto outcome = measure(request.deadline, [&] { link.exposure_done(request.id); });
+      const auto outcome = measure(request.part, request.deadline, [&] { link.exposure_done(request.id); });
       const Measurement& m = outcome.measurement;
       report.code = m.code;
       report.effective_marks = m.pose.effective_marks;
@@ -261,7 +228,7 @@ Report Cycle::report_for(const Request& request) {
         report.code = Code::camera_moved;
         return report;
       }
-      const auto outcome = take_zero(request.deadline);
+      const auto outcome = take_zero(request.part, request.deadline);
       report.code = outcome.code;
       return report;
     }
@@ -273,7 +240,7 @@ Report Cycle::report_for(const Request& request) {
       return report;
     }
     case CommandKind::at_position:
-      report.code = Code::no_procedure;
+      report.code = look_from_hand(request);
       return report;
     default:
       report.code = Code::unknown_command;
@@ -285,10 +252,30 @@ void Cycle::select(std::size_t job) {
   if (job == selected_) return;
   selected_ = job;
   X_O0O_last_.reset();
+  hands_.forget();
   forget_checks();
 }
 
-MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& on_exposed) {
+Code Cycle::look_from_hand(const Request& request) {
+  const Job& job = cell_.jobs[selected_];
+  Standing standing = standing_of(cell_, job, request);
+  if (standing.code == Code::ok) {
+    const std::size_t camera[] = {job.positions[standing.position].camera};
+    FrameSet grabbed = grabber_.grab_live(camera, request.deadline - compute_reserve);
+    standing.code = grabbed.code;
+    standing.reason = std::move(grabbed.reason);
+    if (grabbed.code == Code::ok)
+      hands_.take(standing.position, request.part, request.X_RH, grabbed.frames.front(),
+                  static_cast<std::size_t>(cell_.zero_frames));
+  }
+  spdlog::info("{} request {}: position {} of part {}: code {}{}", cell_.robots.at(request.robot).name,
+               request.id, request.argument, request.part, static_cast<int>(standing.code),
+               standing.reason.empty() ? "" : " (" + standing.reason + ")");
+  return standing.code;
+}
+
+MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadline,
+                              const std::function<void()>& on_exposed) {
   const Job& job = cell_.jobs[selected_];
   MeasureOutcome outcome;
   outcome.job = &job;
@@ -299,9 +286,11 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
     m.reason = zeros_[selected_].reason;
     return outcome;
   }
-  const auto cameras = cameras_of(job);
   const auto start = Clock::now();
-  FrameSet grabbed = grabber_.grab_live(cameras, deadline - compute_reserve);
+  m.code = Code::position_missing;
+  m.reason = hands_.missing(job, part, start);
+  if (!m.reason.empty()) return outcome;
+  JobPictures grabbed = job_pictures(cell_, job, grabber_, hands_, 0, deadline - compute_reserve);
   const auto computing = Clock::now();
   outcome.grab = computing - start;
   if (grabbed.code != Code::ok) {
@@ -314,74 +303,25 @@ MeasureOutcome Cycle::measure(TimePoint deadline, const std::function<void()>& o
   outcome.device_spread = grabbed.device_spread;
   on_exposed();
   const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
-  const auto images = images_of(cameras, outcome.frames);
-  m = zeropose::measure({images, job, cell_.calibration, zero->zero, X_O0O_last_, references, &trend_});
+  const auto images = images_of(grabbed.eyes, outcome.frames);
+  const auto cameras = cameras_for(cell_, job, hands_.hands(job));
+  hands_.forget();  // every picture counts once
+  m = zeropose::measure({images, job, cameras, zero->zero, X_O0O_last_, references, &trend_});
   remember(m.references);
   follow_health(health_, images, m, job, cell_);
-  for (const std::size_t camera : cameras) outcome.health.push_back(health_[camera]);
+  for (const std::size_t eye : grabbed.eyes)
+    outcome.health.push_back(health_[device_of(job, eye, cell_.cameras.size())]);
   outcome.compute = Clock::now() - computing;
   return outcome;
 }
 
-ZeroOutcome Cycle::take_zero(TimePoint deadline) {
-  const Job& job = cell_.jobs[selected_];
-  const auto cameras = cameras_of(job);
-  std::vector<std::vector<Observation>> observations;
-  std::vector<std::vector<MarkFinding>> references;
-  for (int i = 0; i < cell_.zero_frames; ++i) {
-    last_progress_ = Clock::now();
-    const FrameSet grabbed =
-        grabber_.grab_live(cameras, std::min(deadline - compute_reserve, Clock::now() + cell_.deadline));
-    if (grabbed.code != Code::ok) return {grabbed.code, grabbed.reason, {}, Vector6::Zero()};
-    const auto images = images_of(cameras, grabbed.frames);
-    const auto findings = find_job_marks(images, job, cell_.calibration, job.X_WO_nominal);
-    observations.push_back(observations_of(findings, job));
-    references.push_back(find_references(images, cell_.references, cell_.calibration));
-  }
-  ZeroResult result = make_zero(cell_.calibration, job, observations);
-  if (result.code == Code::ok) {
-    ReferenceZero fixed = average_references(cell_.references, cell_.calibration, references);
-    result.code = fixed.code;
-    result.reason = std::move(fixed.reason);
-    result.zero.references = std::move(fixed.references);
-  }
-  ZeroOutcome outcome{result.code, result.reason, {}, result.spread};
-  if (result.code == Code::ok) keep(job, result, outcome);
-  return outcome;
-}
-
-// A zero counts once it is safely on disk, not before.
-void Cycle::keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome) {
-  ZeroRecord record;
-  record.job = job.name;
-  record.zero = result.zero;
-  record.spread = result.spread;
-  record.frames = cell_.zero_frames;
-  record.config_hash = cell_.config_hash;
-  record.calibration_hash = cell_.calibration_hash;
-  record.time_utc = iso8601_utc(std::chrono::system_clock::now());
-  try {
-    record.id = save_zero(state_, record);
-  } catch (const std::exception& error) {
-    spdlog::error("the zero is not saved: {}", error.what());
-    outcome.code = Code::storage_failed;
-    outcome.reason = error.what();
-    return;
-  }
-  outcome.record = record;
-  zeros_[selected_] = {Code::ok, {}, record};
-  X_O0O_last_.reset();
-  forget_checks();
-  spdlog::info("job {}: zero {} taken", job.name, hex(record.id));
-}
-
 MeasureOutcome Cycle::measure_now() {
-  return run_between<MeasureOutcome>([this] { return measure(Clock::now() + cell_.deadline, [] {}); });
+  return run_between<MeasureOutcome>([this] { return measure({}, Clock::now() + cell_.deadline, [] {}); });
 }
 
 ZeroOutcome Cycle::zero_now() {
   return run_between<ZeroOutcome>([this] {
-    auto outcome = take_zero(Clock::now() + cell_.zero_deadline);
+    auto outcome = take_zero({}, Clock::now() + cell_.zero_deadline);
     refresh();
     return outcome;
   });
@@ -398,9 +338,10 @@ Snapshot Cycle::snapshot(std::size_t camera) {
   if (snapshot.grabbed.status != GrabStatus::ok) return snapshot;
   const auto& zero = zeros_[selected_].record;
   const Pose X_WO_expected = zero ? zero->zero.X_WO0 : job.X_WO_nominal;
-  const auto searches = job_searches(job, cell_.calibration, X_WO_expected);
+  const auto calibration = cameras_for(cell_, job);
+  const auto searches = job_searches(job, calibration, X_WO_expected);
   const auto findings =
-      find_job_marks(images_of(cameras, {&snapshot.grabbed.frame, 1}), job, cell_.calibration, X_WO_expected);
+      find_job_marks(images_of(cameras, {&snapshot.grabbed.frame, 1}), job, calibration, X_WO_expected);
   for (std::size_t i = 0; i < job.views.size(); ++i)
     if (job.views[i].camera == camera)
       snapshot.marks.push_back({job.marks[job.views[i].mark].name, searches[i], findings[i]});

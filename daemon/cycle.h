@@ -16,6 +16,7 @@
 #include "daemon/camera_health.h"
 #include "daemon/grab.h"
 #include "daemon/overlay.h"
+#include "daemon/pictures.h"
 #include "measure/measurement.h"
 #include "protocol/robot_link.h"
 
@@ -65,7 +66,8 @@ struct Status {
   std::uint64_t cycles = 0;    // requests of robots carried out
 };
 
-ImageView view_of(const Frame& frame);
+// Of the deadline, kept for measuring and publishing.
+inline constexpr std::chrono::milliseconds compute_reserve{25};
 
 class Cycle {
  public:
@@ -105,9 +107,13 @@ class Cycle {
   void carry_out(const Request& request);
   Report report_for(const Request& request);
   void select(std::size_t job);
-  MeasureOutcome measure(TimePoint deadline, const std::function<void()>& on_exposed);
-  ZeroOutcome take_zero(TimePoint deadline);
-  void keep(const Job& job, const ZeroResult& result, ZeroOutcome& outcome);
+  // AtPosition: a picture of the camera on the hand, for the next measurement or zero of that part.
+  Code look_from_hand(const Request& request);
+  // part: whose pictures from hands count; none: of whichever was looked at last.
+  MeasureOutcome measure(std::optional<std::uint32_t> part, TimePoint deadline,
+                         const std::function<void()>& on_exposed);
+  ZeroOutcome take_zero(std::optional<std::uint32_t> part, TimePoint deadline);
+  void keep(const Job& job, const ZeroResult& result, std::size_t frames, ZeroOutcome& outcome);
   Snapshot snapshot(std::size_t camera);
   void remember(const ReferenceCheck& check);
   bool a_camera_moved() const;
@@ -128,6 +134,7 @@ class Cycle {
   ReferenceTrend trend_;              // since the zero of the selected job
   std::vector<CameraCheck> checks_;   // by camera, when its references were last looked at
   std::vector<CameraHealth> health_;  // by camera
+  HandPictures hands_;                // of the selected job
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;

@@ -32,6 +32,14 @@ constexpr std::array table{
     CodeText{Code::no_procedure, "no_procedure",
              "A robot told its position, but no calibration waits for it.",
              "Start the calibration first, then the robot program that goes through the positions."},
+    CodeText{Code::wrong_position, "wrong_position",
+             "The robot's hand is not where the job's position was taught, or it is another robot's.",
+             "Compare the position in the robot program with the cell file: index, pose, and the frame it is "
+             "told in."},
+    CodeText{Code::position_missing, "position_missing",
+             "The camera on the robot's hand has not looked at this part from all positions of the job.",
+             "Let the robot tell every position by AtPosition, with the part's id, before Measure or Zero; "
+             "each picture counts once."},
 
     CodeText{Code::camera_missing, "camera_missing", "A camera of the job does not answer.",
              "Check its power, its network cable and the switch; the camera's name is in the reason."},

@@ -20,6 +20,8 @@ enum class Code : std::uint16_t {
   halted = 105,
   argument_out_of_range = 106,
   no_procedure = 107,
+  wrong_position = 108,
+  position_missing = 109,
 
   camera_missing = 201,
   frame_timeout = 202,

@@ -30,7 +30,8 @@ struct Mark {
   double sigma_mm = 0;  // non-rigidity of the place it sits on
 };
 
-// Camera and mark are indices into the cell's cameras and the job's marks.
+// Camera and mark are indices into the cell's cameras and the job's marks. After the cell's cameras come
+// those on a robot's hand at each of the job's positions.
 struct View {
   std::size_t camera = 0;
   std::size_t mark = 0;
@@ -39,6 +40,15 @@ struct View {
 struct ApplicationPoint {
   std::string name;
   Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();
+};
+
+// From where a camera on a robot's hand looks at the object (spec 50 M3, virtual cameras).
+struct HandPosition {
+  std::string name;
+  std::size_t camera = 0;        // of the cell, on a hand
+  Pose X_RH = Pose::Identity();  // as taught
+  double tolerance_mm = 1;       // how far from there the hand may stand
+  double tolerance_deg = 0.5;
 };
 
 struct Range {
@@ -68,11 +78,18 @@ struct Job {
       Pose::Identity();  // where the object stops ideally, before a zero measurement says it better
   std::optional<Pose> X_WP_planar{};  // a sheet: only x, y, rz in this plane of the world are free, O lies in
                                       // it with its z axis across
-  double search_mm = 0;               // search areas reach this far round the expected place
-  double system_sigma_px = 0;         // calibration errors that remain after zero (M6.3)
+  std::vector<HandPosition> positions{};
+  double positions_within_s = 60;  // from the first position to the measurement
+  double search_mm = 0;            // search areas reach this far round the expected place
+  double system_sigma_px = 0;      // calibration errors that remain after zero (M6.3)
   std::vector<ApplicationPoint> application_points;
   Requirements requirements;
 };
+
+// The camera of the cell that takes the picture of a view, for a cell of so many cameras.
+inline std::size_t device_of(const Job& job, std::size_t view_camera, std::size_t cell_cameras) {
+  return view_camera < cell_cameras ? view_camera : job.positions.at(view_camera - cell_cameras).camera;
+}
 
 // Fewer marks fix no pose, whatever the requirements say.
 inline int least_marks(const Job& job) { return job.X_WP_planar ? 2 : 3; }

@@ -198,8 +198,9 @@ std::string plan_text(const Cell& cell, const Job& job, const Plan& plan) {
 }
 
 Answer plan_of(const Options& options) {
-  const Cell cell = load_cell(options.cell);
+  Cell cell = load_cell(options.cell);
   const Job& job = job_of(cell, options.job);
+  cell.calibration = cameras_for(cell, job);
   const Plan result = plan({cell.calibration, job, options.sigma_px, &cell.references});
   return {result.verdict.code == Code::ok ? done : no_answer, plan_json(cell, job, result),
           plan_text(cell, job, result)};

@@ -1,0 +1,177 @@
+#include "config/job_reader.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string_view>
+
+#include "config/text.h"
+
+namespace zeropose {
+namespace {
+
+// In pairs of one kind, dark and bright.
+constexpr std::array<std::string_view, 10> mark_kind_names{
+    "dark_disc",   "bright_disc", "dark_ring",   "bright_ring", "dark_ball",
+    "bright_ball", "dark_slot",   "bright_slot", "dark_cross",  "bright_cross"};
+constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring, MarkKind::ball, MarkKind::slot,
+                                MarkKind::cross};
+
+void read_normal(JsonObject& object, Eigen::Vector3d& normal_O) {
+  Eigen::Vector3d given;
+  if (object.read_optional("normal", given, 2.0)) take_direction(object, "normal", given, normal_O);
+}
+
+// A ring has a circle inside, other marks have none.
+void read_inner_radius(JsonObject& object, Mark& mark) {
+  double radius_mm = 0;
+  const bool given = object.read_optional("inner_radius_mm", radius_mm, NumberRange{0, 1000, true});
+  const bool ring = mark.kind == MarkKind::ring;
+  if (ring && !(radius_mm > 0 && radius_mm < mark.radius_mm))
+    object.add_mistake("inner_radius_mm", given ? "a radius not below radius_mm" : "a ring without it",
+                       "the radius of the ring's inner circle, mm, below radius_mm");
+  if (!ring && given) object.add_mistake("inner_radius_mm", "a mark that is no ring", "no such key");
+  if (ring) mark.inner_radii_mm = {radius_mm};
+}
+
+NamedMark read_mark(JsonObject& object) {
+  NamedMark named = read_look(object);
+  Mark& mark = named.mark;
+  object.read("position_mm", mark.p_O_mm, largest_coordinate_mm);
+  object.read_optional("weight", mark.weight, NumberRange{0, 1});
+  object.read_optional("tolerance_px", mark.tolerance_px, NumberRange{0, 1000, true});
+  object.read_optional("tolerance_mm", mark.tolerance_mm, NumberRange{0, 1000, true});
+  object.read_optional("sigma_mm", mark.sigma_mm, NumberRange{0, 100});
+  return named;
+}
+
+void read_requirements(JsonObject& object, Requirements& requirements) {
+  object.read("min_marks", requirements.min_marks, 2, 10000);
+  object.read_optional("min_marks_per_camera", requirements.min_marks_per_camera, 0, 10000);
+  object.read_optional("min_cameras", requirements.min_cameras, 1, 1000);
+  object.read("max_sigma_mm", requirements.max_sigma_mm, NumberRange{0, 100, true});
+  object.read_optional("max_hidden_mm", requirements.max_hidden_mm, NumberRange{0, 1000, true});
+  object.read_optional("max_compensation_mm", requirements.max_compensation_mm, NumberRange{0, 100});
+  object.read_optional("max_displacement_mm", requirements.max_displacement_mm, NumberRange{0, 10000});
+  object.read_optional("max_step_mm", requirements.max_step_mm, NumberRange{0, 10000});
+  object.read_optional("max_step_deg", requirements.max_step_deg, NumberRange{0, 180});
+}
+
+void read_limits(JsonObject& object, std::array<Range, 6>& limits) {
+  constexpr std::array keys{"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"};
+  for (std::size_t i = 0; i < keys.size(); ++i)
+    object.read_range(keys[i], limits[i].min, limits[i].max, i < 3 ? 10000 : 180);
+}
+
+ApplicationPoint read_application_point(JsonObject& object) {
+  ApplicationPoint point;
+  object.read("name", point.name);
+  object.read("position_mm", point.p_O_mm, largest_coordinate_mm);
+  return point;
+}
+
+HandPosition read_position(JsonObject& object, const std::vector<Mounted>& cameras) {
+  HandPosition position;
+  std::string camera;
+  object.read("name", position.name);
+  if (std::ranges::find(cameras, position.name, &Mounted::camera) != cameras.end())
+    object.add_mistake("name", in_quotes(position.name), "a name that no camera has");
+  if (object.read("camera", camera)) {
+    const auto found = std::ranges::find(cameras, camera, &Mounted::camera);
+    if (found == cameras.end() || found->robot.empty())
+      object.add_mistake("camera", in_quotes(camera), "the name of a camera with on_hand_of");
+    else
+      position.camera = static_cast<std::size_t>(found - cameras.begin());
+  }
+  object.read("hand_pose", position.X_RH);
+  object.read_optional("tolerance_mm", position.tolerance_mm, NumberRange{0, 1000, true});
+  object.read_optional("tolerance_deg", position.tolerance_deg, NumberRange{0, 180, true});
+  return position;
+}
+
+// Returns what the job's marks can be seen from.
+Eyes read_positions(JsonObject& object, const std::vector<Mounted>& cameras, Job& job) {
+  object.read_each_optional(
+      "positions", [&](JsonObject& member) { job.positions.push_back(read_position(member, cameras)); });
+  object.read_optional("positions_within_s", job.positions_within_s, NumberRange{0, 3600, true});
+  Eyes eyes = fixed_eyes(cameras);
+  for (const HandPosition& position : job.positions) eyes.push_back(position.name);
+  return eyes;
+}
+
+}  // namespace
+
+void take_direction(JsonObject& object, std::string_view key, const Eigen::Vector3d& given,
+                    Eigen::Vector3d& direction) {
+  if (std::abs(given.norm() - 1) > 0.01)
+    object.add_mistake(key, concat({"a vector of length ", std::to_string(given.norm())}),
+                       "a unit vector (length 0.99 to 1.01)");
+  else
+    direction = given.normalized();
+}
+
+// The inner radius is read after the radius.
+NamedMark read_look(JsonObject& object) {
+  NamedMark named;
+  Mark& mark = named.mark;
+  std::size_t kind = 0;
+  object.read("name", mark.name);
+  object.read("cameras", named.cameras);
+  if (object.read_word("kind", mark_kind_names, kind)) {
+    mark.kind = mark_kinds[kind / 2];
+    mark.bright = kind % 2 == 1;
+  }
+  read_normal(object, mark.normal_O);
+  object.read_optional("radius_mm", mark.radius_mm, NumberRange{0, 1000, true});
+  read_inner_radius(object, mark);
+  return named;
+}
+
+void add_views(JsonObject& object, const NamedMark& named, const Eyes& eyes, std::size_t index,
+               std::vector<View>& views) {
+  constexpr const char* expected = "the name of a fixed camera of this cell, or of a position of this job";
+  if (object.has("cameras") && named.cameras.empty()) object.add_mistake("cameras", "no camera", expected);
+  for (std::size_t i = 0; i < named.cameras.size(); ++i) {
+    const std::string& name = named.cameras[i];
+    const std::string key = path_of("cameras", i);
+    const auto eye = std::ranges::find(eyes, name);
+    if (eye == eyes.end() || name.empty())
+      object.add_mistake(key, in_quotes(name), expected);
+    else if (std::find(named.cameras.begin(), named.cameras.begin() + static_cast<std::ptrdiff_t>(i), name) !=
+             named.cameras.begin() + static_cast<std::ptrdiff_t>(i))
+      object.add_mistake(key, in_quotes(name) + " twice", "each camera once");
+    else
+      views.push_back({static_cast<std::size_t>(eye - eyes.begin()), index});
+  }
+}
+
+Eyes fixed_eyes(const std::vector<Mounted>& cameras) {
+  Eyes eyes;
+  for (const Mounted& mounted : cameras) eyes.push_back(mounted.robot.empty() ? mounted.camera : "");
+  return eyes;
+}
+
+Job read_job(JsonObject& object, const std::vector<Mounted>& cameras) {
+  Job job;
+  object.read("name", job.name);
+  object.read("number", job.number, 1, 65535);
+  object.read("nominal_pose", job.X_WO_nominal);
+  Pose X_WP = Pose::Identity();
+  if (object.read_optional("planar", X_WP)) job.X_WP_planar = X_WP;
+  const Eyes eyes = read_positions(object, cameras, job);
+  object.read("search_mm", job.search_mm, NumberRange{0, 10000, true});
+  object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
+  object.read_each("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
+    const NamedMark named = read_mark(member);
+    add_views(member, named, eyes, job.marks.size(), job.views);
+    job.marks.push_back(named.mark);
+  });
+  object.read_each("application_points", 1, [&](JsonObject& member) {
+    job.application_points.push_back(read_application_point(member));
+  });
+  object.read("requirements", [&](JsonObject& member) { read_requirements(member, job.requirements); });
+  object.read("limits", [&](JsonObject& member) { read_limits(member, job.requirements.limits); });
+  return job;
+}
+
+}  // namespace zeropose
