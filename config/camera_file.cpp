@@ -22,7 +22,8 @@ bool is_one_camera(const JsonValue& tree) {
 CameraFile read_one(JsonObject& camera) {
   CameraFile read;
   read.camera.model = read_model(camera);
-  read.has_pose = camera.read_optional("X_WC", read.camera.X_WC);
+  read.camera.on_hand = camera.has("X_HC");
+  read.has_pose = camera.read_optional(read.camera.on_hand ? "X_HC" : "X_WC", read.camera.X_WC);
   return read;
 }
 

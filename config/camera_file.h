@@ -12,7 +12,7 @@ namespace zeropose {
 
 struct CameraFile {
   CalibratedCamera camera;  // the name is empty where the file has none
-  bool has_pose = false;    // where X_WC is absent it is the identity
+  bool has_pose = false;    // where X_WC (on a hand: X_HC) is absent it is the identity
 };
 
 // `name` chooses among several cameras and may be empty where there is one. Throws ConfigError.

@@ -205,6 +205,7 @@ Cell load_cell(const std::filesystem::path& path) {
   if (!calibration.empty()) {
     try {
       const std::filesystem::path file = path.parent_path() / calibration;
+      cell.calibration_file = file;
       add_calibration(cell, read_file(file), file.string(), mistakes);
       place_references(cell, path.string(), mistakes);
     } catch (const ConfigError& error) {

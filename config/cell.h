@@ -34,6 +34,7 @@ struct Cell {
   std::string name;
   bool simulated = false;
   std::vector<CameraOptions> cameras;
+  std::filesystem::path calibration_file;           // empty when the cell was not read from files
   std::vector<CalibratedCamera> calibration;        // same order as cameras
   std::vector<std::optional<std::size_t>> hand_of;  // likewise: the robot that carries it; none: it is fixed
   std::vector<Job> jobs;

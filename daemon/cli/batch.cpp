@@ -14,6 +14,7 @@
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/calibration.h"
 #include "daemon/cli/convert.h"
 #include "daemon/cli/find.h"
 #include "daemon/cli/find_board.h"
@@ -284,6 +285,7 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_plan(app, exit_status);
   add_triangulate(app, exit_status);
   add_recalibrate(app, exit_status);
+  add_calibration(app, exit_status);
 }
 
 }  // namespace zeropose

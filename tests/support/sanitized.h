@@ -1,5 +1,5 @@
-// Under a sanitizer a program is ten times slower and statistics tell nothing new: what counts there is that every path
-// is gone through.
+// Under a sanitizer a program is ten times slower and statistics tell nothing new: what counts there is that
+// every path is gone through.
 #pragma once
 
 namespace zeropose::test {

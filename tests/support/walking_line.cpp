@@ -41,14 +41,6 @@ std::string program_path(const std::string& name) {
   return (tools != nullptr ? tools : std::string(ZEROPOSE_BIN_DIR)) + "/" + name;
 }
 
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "zeropose-test-XXXXXX").string();
-  if (!::mkdtemp(name.data())) throw std::runtime_error("cannot make " + name);
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() { std::filesystem::remove_all(path_); }
-
 WalkingLine::WalkingLine(std::filesystem::path cell)
     : cell_(std::move(cell)),
       notify_(folder_ / "notify.sock"),

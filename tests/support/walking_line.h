@@ -10,6 +10,7 @@
 #include "sim/robot.h"
 #include "tests/support/process.h"
 #include "tests/support/recorder.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 
@@ -19,20 +20,6 @@ inline constexpr double line_error_mm = 0.4, line_error_deg = 0.012;
 // The daemon is the one under test. ZEROPOSE_TOOLS may name a folder with the other programs: a daemon that
 // is slow under a sanitizer needs a cell that keeps its times.
 std::string program_path(const std::string& name);
-
-// A folder that goes with its owner.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  std::filesystem::path operator/(const std::string& name) const { return path_ / name; }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
 
 // Files live in `folder`: state/, control and notify sockets, logs.
 class WalkingLine {
