@@ -31,6 +31,8 @@ void read_milliseconds(JsonObject& object, std::string_view key, std::chrono::mi
 ReferencePoint read_reference_place(JsonObject& object, const NamedMark& named) {
   ReferencePoint point;
   point.mark = named.mark;
+  if (point.mark.kind == MarkKind::corner)
+    object.add_mistake("kind", "a corner", "a round mark, a slot or a cross: a reference point is no corner");
   object.read_optional("group", point.group);
   const bool known = object.read_optional("position_mm", point.mark.p_O_mm, largest_coordinate_mm);
   std::array<double, 2> taught_px{};

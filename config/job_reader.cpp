@@ -11,11 +11,11 @@ namespace zeropose {
 namespace {
 
 // In pairs of one kind, dark and bright.
-constexpr std::array<std::string_view, 10> mark_kind_names{
-    "dark_disc",   "bright_disc", "dark_ring",   "bright_ring", "dark_ball",
-    "bright_ball", "dark_slot",   "bright_slot", "dark_cross",  "bright_cross"};
-constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring, MarkKind::ball, MarkKind::slot,
-                                MarkKind::cross};
+constexpr std::array<std::string_view, 12> mark_kind_names{
+    "dark_disc", "bright_disc", "dark_ring",  "bright_ring",  "dark_ball",   "bright_ball",
+    "dark_slot", "bright_slot", "dark_cross", "bright_cross", "dark_corner", "bright_corner"};
+constexpr std::array mark_kinds{MarkKind::disc, MarkKind::ring,  MarkKind::ball,
+                                MarkKind::slot, MarkKind::cross, MarkKind::corner};
 
 void read_normal(JsonObject& object, Eigen::Vector3d& normal_O) {
   Eigen::Vector3d given;
@@ -34,9 +34,29 @@ void read_inner_radius(JsonObject& object, Mark& mark) {
   if (ring) mark.inner_radii_mm = {radius_mm};
 }
 
+// A corner has two edges that can be told from one straight line, other marks have none.
+void read_edges(JsonObject& object, Mark& mark) {
+  constexpr double least_sine = 0.25;  // 15 degrees
+  std::vector<Eigen::Vector3d> given;
+  const bool there = object.read_optional("edges", given, 2.0);
+  if (mark.kind != MarkKind::corner) {
+    if (there) object.add_mistake("edges", "a mark that is no corner", "no such key");
+    return;
+  }
+  const auto no_direction = [](const Eigen::Vector3d& edge) { return std::abs(edge.norm() - 1) > 0.01; };
+  if (given.size() != 2 || std::ranges::any_of(given, no_direction) ||
+      given[0].cross(given[1]).norm() < least_sine) {
+    object.add_mistake("edges", there ? "no two such edges" : "a corner without them",
+                       "two unit vectors along the corner's edges, away from it, 15 to 165 degrees apart");
+    return;
+  }
+  for (const Eigen::Vector3d& edge : given) mark.edges_O.push_back(edge.normalized());
+}
+
 NamedMark read_mark(JsonObject& object) {
   NamedMark named = read_look(object);
   Mark& mark = named.mark;
+  read_edges(object, mark);
   object.read("position_mm", mark.p_O_mm, largest_coordinate_mm);
   object.read_optional("weight", mark.weight, NumberRange{0, 1});
   object.read_optional("tolerance_px", mark.tolerance_px, NumberRange{0, 1000, true});

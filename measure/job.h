@@ -22,10 +22,11 @@ struct Mark {
   bool bright = false;                                 // brighter than what surrounds it
   Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();    // its centre
   Eigen::Vector3d normal_O = Eigen::Vector3d::Zero();  // of its plane, towards the camera; zero: unknown
-  double radius_mm = 0;                  // of its outline; 0: unknown; then no eccentricity correction
-  std::vector<double> inner_radii_mm{};  // of a ring's further circles, descending
-  double weight = 1;                     // the user's factor 0..1; 0: only its deviation is reported
-  double tolerance_px = no_tolerance;    // largest deviation
+  double radius_mm = 0;                    // of its outline; 0: unknown; then no eccentricity correction
+  std::vector<double> inner_radii_mm{};    // of a ring's further circles, descending
+  std::vector<Eigen::Vector3d> edges_O{};  // unit; of a corner: along its two edges, away from it
+  double weight = 1;                       // the user's factor 0..1; 0: only its deviation is reported
+  double tolerance_px = no_tolerance;      // largest deviation
   double tolerance_mm = no_tolerance;
   double sigma_mm = 0;  // non-rigidity of the place it sits on
 };

@@ -20,10 +20,28 @@ constexpr double axis_ratio_tolerance = 0.6;
 constexpr double thinnest_axis_ratio = 0.05;
 // Limits for marks of unknown radius.
 constexpr double smallest_diameter_px = 4;
+// How much the angle of a corner and its direction differ from what is expected at most.
+constexpr double corner_tolerance_rad = 0.35;
 // Things in one window that the geometry is asked about; more are no question of geometry.
 constexpr std::size_t most_alike = 12;
 // How far the zero of a sheet may lie off its plane, mm and rad: rounding.
 constexpr double in_plane = 1e-6;
+
+// The directions of a corner's two edges in the image as what to look for.
+void look_along_edges(MarkSearch& search, const CalibratedCamera& camera, const Mark& mark,
+                      const Pose& X_CO) {
+  const auto projection = project_with_jacobian(camera.model, X_CO * mark.p_O_mm);
+  if (!projection || mark.edges_O.size() != 2) return;
+  const auto seen = [&](const Eigen::Vector3d& edge_O) -> Eigen::Vector2d {
+    return (projection->du_dp * (X_CO.linear() * edge_O)).normalized();
+  };
+  const Eigen::Vector2d first = seen(mark.edges_O[0]), second = seen(mark.edges_O[1]);
+  const Eigen::Vector2d middle = first + second;
+  search.direction_rad = std::atan2(middle.y(), middle.x());
+  search.direction_tolerance_rad = corner_tolerance_rad;
+  search.opening_rad = std::acos(std::clamp(first.dot(second), -1.0, 1.0));
+  search.opening_tolerance_rad = corner_tolerance_rad;
+}
 
 MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double search_mm, const Pose& X_WO) {
   MarkSearch search;
@@ -45,6 +63,7 @@ MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double s
       known ? (1 + diameter_tolerance) * diameter_px : 2 * search.half_window_px.minCoeff();
   if (mark.kind == MarkKind::slot || mark.kind == MarkKind::cross)
     search.min_axis_ratio = thinnest_axis_ratio;
+  if (mark.kind == MarkKind::corner) look_along_edges(search, camera, mark, X_CO);
   if (mark.normal_O.isZero() || mark.kind == MarkKind::ball) return search;
   const bool flat = mark.kind == MarkKind::disc || mark.kind == MarkKind::ring;
   const double facing = std::abs((X_CO.linear() * mark.normal_O).normalized().dot(p_CQ.normalized()));

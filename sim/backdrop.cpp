@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 #include "sim/clutter.h"
 #include "sim/random.h"
@@ -24,7 +23,6 @@ constexpr double standing_depth_share = 0.85;  // standing things hang nearer th
 struct Stage {
   const CalibratedCamera& camera;
   std::vector<Mark> marks;  // that this camera sees
-  std::vector<Mark> fixed;  // reference points that it sees
   Pose X_WO;
   Pose X_CO;
   Pose X_CP;             // P: the panel behind the marks, axes roughly as the camera's
@@ -41,18 +39,10 @@ struct Stage {
   }
 };
 
-std::vector<Mark> marks_of(const std::vector<Mark>& all, const std::vector<View>& views, std::size_t camera) {
-  std::vector<Mark> marks;
-  for (const View& view : views)
-    if (view.camera == camera) marks.push_back(all.at(view.mark));
-  return marks;
-}
-
 Stage make_stage(const Scene& scene, std::size_t camera_index, Random& random) {
   const CalibratedCamera& camera = scene.cameras.at(camera_index);
   Stage stage{.camera = camera,
-              .marks = marks_of(scene.marks, scene.views, camera_index),
-              .fixed = marks_of(scene.fixed_marks, scene.fixed_views, camera_index),
+              .marks = marks_seen(scene.marks, scene.views, camera_index),
               .X_WO = scene.X_WO_nominal,
               .X_CO = camera.X_WC.inverse() * scene.X_WO_nominal,
               .X_CP = Pose::Identity(),
@@ -68,76 +58,6 @@ Stage make_stage(const Scene& scene, std::size_t camera_index, Random& random) {
   stage.px_per_mm = camera.model.fx_px / depth_mm;
   return stage;
 }
-
-Illumination make_light(const Stage& stage, Random& random) {
-  const CameraModel& model = stage.camera.model;
-  const Vector2d size(model.width_px, model.height_px);
-  const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
-  return {size / 2,
-          stage.picture.illumination_gradient / size.norm() * Vector2d(std::cos(angle), std::sin(angle))};
-}
-
-// ---- the plates that carry the marks
-
-Pose mark_pose(const Mark& mark, const Stage& stage) {
-  Vector3d z_O = mark.normal_O;
-  if (z_O.norm() < 1e-9) z_O = stage.X_CO.linear().transpose() * -Vector3d::UnitZ();
-  z_O.normalize();
-  const Vector3d right_O = stage.X_CO.linear().transpose() * Vector3d::UnitX();
-  Pose X_OM = Pose::Identity();
-  X_OM.linear().col(0) = (right_O - z_O * z_O.dot(right_O)).normalized();
-  X_OM.linear().col(1) = z_O.cross(Vector3d(X_OM.linear().col(0)));
-  X_OM.linear().col(2) = z_O;
-  X_OM.translation() = mark.p_O_mm;
-  return X_OM;
-}
-
-std::vector<Thing> plate_things(double radius_mm, double grey, Random& random) {
-  const double angle = random.uniform(-0.4, 0.4);
-  const Vector2d half(radius_mm + random.uniform(18, 24), radius_mm + random.uniform(18, 26));
-  const Paint metal{.grey = grey, .bevel_mm = 2, .bevel_grey = 22};
-  const bool six_sided = random.uniform() < 0.3;
-  std::vector<Thing> things;
-  if (six_sided) {
-    things.push_back({hexagon(Vector2d::Zero(), angle, half.x()), metal});
-    return things;
-  }
-  things.push_back({rounded_box(Vector2d::Zero(), angle, half, random.uniform(3, 12)), metal});
-  const Shape plate = things.front().shape;
-  const Vector2d across(-plate.axis.y(), plate.axis.x());
-  for (const double side : {-1.0, 1.0}) {
-    const Vector2d corner = side * ((half.x() - 7) * plate.axis + (half.y() - 7) * across);
-    things.push_back({disc(corner, 2.8), {.grey = 0.8 * grey, .bevel_mm = 1.6, .bevel_grey = 40}});
-  }
-  return things;
-}
-
-std::vector<Thing> cover_things(double radius_mm, double grey, Random& random) {
-  const Vector2d half(radius_mm + random.uniform(7, 10), radius_mm + random.uniform(9, 13));
-  const double angle = random.uniform(-0.6, 0.6);
-  return {{rounded_box({2, 3}, angle, half, 3), {.grey = 0.6 * grey, .opacity = 0.6, .softness_mm = 2}},
-          {rounded_box(Vector2d::Zero(), angle, half, 2),
-           {.grey = 1.12 * grey, .bevel_mm = 1.5, .bevel_grey = 12}}};
-}
-
-MarkPlate make_plate(const Mark& mark, const Stage& stage, Random& random) {
-  if (mark.kind != MarkKind::disc)
-    throw std::invalid_argument("mark " + mark.name + ": the simulated cell draws discs only");
-  const bool dark = !mark.bright;
-  const double surface =
-      random.uniform(0.93, 1.07) * (dark ? stage.picture.surface_grey : stage.picture.mark_grey);
-  MarkPlate plate;
-  plate.name = mark.name;
-  plate.X_OM = mark_pose(mark, stage);
-  plate.radius_mm = mark.radius_mm;
-  plate.mark_grey = dark ? stage.picture.mark_grey : stage.picture.surface_grey;
-  plate.surface_grey = surface;
-  plate.things = plate_things(mark.radius_mm, surface, random);
-  plate.cover = cover_things(mark.radius_mm, surface, random);
-  return plate;
-}
-
-double plate_reach_mm(const MarkPlate& plate) { return bounding_radius_mm(plate.things.front().shape); }
 
 // ---- the underbody behind them
 
@@ -359,18 +279,16 @@ Backdrop make_backdrop(const Scene& scene, std::size_t camera) {
   const Stage stage = make_stage(scene, camera, looks);
   Backdrop backdrop;
   backdrop.hall_grey = 24;
-  backdrop.light = make_light(stage, looks);
-  for (const Mark& mark : stage.marks) backdrop.plates.push_back(make_plate(mark, stage, looks));
+  backdrop.light = drawn_light(stage.camera.model, scene.picture.illumination_gradient, looks);
+  for (const Mark& mark : stage.marks)
+    backdrop.plates.push_back(make_plate(mark, stage.X_CO, scene.picture, looks));
   backdrop.behind.push_back(hall(stage, looks));
   backdrop.on_object.push_back(underbody(stage, backdrop.plates, looks));
-  Random fixed_looks(scene.picture.seed * 1000 + 250 + camera);
-  Stage world = stage;
-  world.X_CO = stage.camera.X_WC.inverse();
-  for (const Mark& mark : stage.fixed) backdrop.fixed_plates.push_back(make_plate(mark, world, fixed_looks));
+  const std::vector<MarkPlate> references = reference_plates(scene, camera);
   std::vector<Taken> on_object = taken_for_object(stage, backdrop.plates),
                      in_front = taken_for_standing(stage);
-  take_fixed(stage, backdrop.fixed_plates, on_object);
-  take_fixed(stage, backdrop.fixed_plates, in_front);
+  take_fixed(stage, references, on_object);
+  take_fixed(stage, references, in_front);
   const int standing = scene.picture.clutter / 3;
   add_object_clutter(stage, scene.picture.clutter - standing, std::move(on_object), backdrop.on_object.back(),
                      clutter);

@@ -12,6 +12,7 @@
 #include "protocol/line_socket.h"
 #include "sim/cell_control.h"
 #include "sim/drive.h"
+#include "sim/sim_file.h"
 
 namespace zeropose {
 namespace {
@@ -21,7 +22,8 @@ struct Options {
   std::string shift;
   std::vector<std::string> faults;
   bool drives = false;
-  DriveOptions drive;
+  std::optional<int> cars;
+  std::optional<std::uint64_t> seed;
 };
 
 std::string version_text() {
@@ -56,6 +58,17 @@ class StopSignals {
 // The truth stands beside the cell file: car-body.json, car-body.sim.json.
 std::filesystem::path sim_file_of(std::filesystem::path cell) { return cell.replace_extension(".sim.json"); }
 
+// What the command line leaves open the truth file says.
+DriveOptions drive_options(const Options& options) {
+  const std::filesystem::path truth = sim_file_of(options.cell);
+  const std::optional<DriveOptions> told = load_sim_file(truth).drive;
+  if (!told) throw std::invalid_argument(truth.string() + " does not say what to drive: it has no key drive");
+  DriveOptions drive = *told;
+  drive.parts = options.cars;
+  drive.seed = options.seed.value_or(drive.seed);
+  return drive;
+}
+
 int run(const Options& options) {
   const StopSignals signals;
   const Cell cell = load_cell(options.cell);
@@ -71,7 +84,7 @@ int run(const Options& options) {
                cell.name.c_str());
   if (options.drives)
     return drive(
-        cell, X_WO_nominal, [&simulated](const Pose& X_WO) { simulated.show(X_WO); }, options.drive,
+        cell, X_WO_nominal, [&simulated](const Pose& X_WO) { simulated.show(X_WO); }, drive_options(options),
         signals.stopped());
   signals.stopped().wait(false);
   return 0;
@@ -87,9 +100,10 @@ void add_options(CLI::App& app, Options& options) {
                  "camera-moved:CAMERA");
   app.add_option("--control", options.control, "Unix socket that moves the object and injects faults");
   auto* drives =
-      app.add_flag("--drive", options.drives, "run the robot's program: one shifted car after the other");
-  app.add_option("--cars", options.drive.cars, "with --drive: stop after so many cars")->needs(drives);
-  app.add_option("--seed", options.drive.seed, "with --drive: of the shifts")->needs(drives);
+      app.add_flag("--drive", options.drives,
+                   "run the robot's program: one shifted part after the other, as the truth file says");
+  app.add_option("--cars", options.cars, "with --drive: stop after so many parts")->needs(drives);
+  app.add_option("--seed", options.seed, "with --drive: of the shifts")->needs(drives);
 }
 
 }  // namespace

@@ -1,11 +1,13 @@
 #include "sim/drive.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
 #include <random>
 #include <thread>
 #include <vector>
 
+#include "measure/code.h"
 #include "sim/robot.h"
 
 namespace zeropose {
@@ -14,7 +16,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-SimulatedRobotOptions robot_options(const Cell& cell) {
+SimulatedRobotOptions robot_options(const Cell& cell, const DriveOptions& drive) {
   const RobotOptions& robot = cell.robots.front();
   SimulatedRobotOptions options;
   const auto& tcp = std::get<ModbusTcpOptions>(robot.link);
@@ -25,7 +27,14 @@ SimulatedRobotOptions robot_options(const Cell& cell) {
   options.frame = static_cast<std::uint16_t>(robot.frame);
   options.first_request_id = std::random_device{}() | 1U;  // a robot that starts anew must not repeat its ids
   options.patience = cell.deadline + 500ms;
+  options.max_translation_mm = drive.robot_max_mm;
+  options.max_rotation_deg = drive.robot_max_deg;
   return options;
+}
+
+Vector6 numbers_of(const Pose& X_AB) {
+  const SixNumbers s = to_six_numbers(X_AB);
+  return {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg};
 }
 
 // What a robot that got `delivered` takes the shift X_O0O to be; the inverse of what the daemon does for its
@@ -43,70 +52,139 @@ Pose shift_from(const RobotOptions& robot, const Pose& X_WO0, const Pose& delive
   }
 }
 
-class Shifts {
+// Where the parts stand, X_O0O.
+class Parts {
  public:
-  explicit Shifts(const DriveOptions& options)
-      : generator_(options.seed),
-        mm_(-options.shift_mm, options.shift_mm),
-        deg_(-options.turn_deg, options.turn_deg) {}
+  Parts(const DriveOptions& options, const Job& job)
+      : options_(options), job_(job), generator_(options.seed) {}
 
   Pose next() {
-    SixNumbers six;
-    for (double* component : {&six.x_mm, &six.y_mm, &six.z_mm}) *component = mm_(generator_);
-    for (double* component : {&six.rx_deg, &six.ry_deg, &six.rz_deg}) *component = deg_(generator_);
-    return from_six_numbers(six);
+    const Pose X_O0O = options_.poses.empty() ? drawn() : options_.poses[count_ % options_.poses.size()];
+    ++count_;
+    const auto every = static_cast<std::size_t>(std::max(options_.beyond_every, 0));
+    return every > 0 && count_ % every == 0 ? beyond_a_limit(X_O0O, count_ / every - 1) : X_O0O;
   }
 
  private:
+  Pose drawn() {
+    std::array<double, 6> six{};
+    for (std::size_t axis = 0; axis < six.size(); ++axis) {
+      const double most = options_.shift(static_cast<Eigen::Index>(axis));
+      six[axis] = std::uniform_real_distribution<double>(-most, most)(generator_);
+    }
+    return from_six_numbers({six[0], six[1], six[2], six[3], six[4], six[5]});
+  }
+
+  // One axis after the other, those that are free; now at its upper end, now at its lower one.
+  Pose beyond_a_limit(const Pose& X_O0O, std::size_t turn) const {
+    constexpr double by = 0.1;  // of the range
+    const std::vector<std::size_t> axes =
+        job_.X_WP_planar ? std::vector<std::size_t>{0, 1, 5} : std::vector<std::size_t>{0, 1, 2, 3, 4, 5};
+    const std::size_t axis = axes[turn % axes.size()];
+    const Range& range = job_.requirements.limits[axis];
+    const double room = by * (range.max - range.min);
+    Vector6 six = numbers_of(X_O0O);
+    six(static_cast<Eigen::Index>(axis)) = turn / axes.size() % 2 == 0 ? range.max + room : range.min - room;
+    return from_six_numbers({six(0), six(1), six(2), six(3), six(4), six(5)});
+  }
+
+  const DriveOptions& options_;
+  const Job& job_;
   std::mt19937_64 generator_;
-  std::uniform_real_distribution<double> mm_, deg_;
+  std::size_t count_ = 0;
 };
 
-struct Car {
+// The codes that a part may get by its true place. Where the errors that are allowed do not tell, several.
+std::vector<Code> expected_codes(const Vector6& truth, const std::array<Range, 6>& limits,
+                                 const Vector6& max_error) {
+  constexpr std::array codes{Code::limit_x,  Code::limit_y,  Code::limit_z,
+                             Code::limit_rx, Code::limit_ry, Code::limit_rz};
+  std::vector<Code> expected;
+  for (std::size_t axis = 0; axis < codes.size(); ++axis) {
+    const auto i = static_cast<Eigen::Index>(axis);
+    const double beyond = std::max(truth(i) - limits[axis].max, limits[axis].min - truth(i));
+    if (beyond > -max_error(i)) expected.push_back(codes[axis]);
+    if (beyond > max_error(i)) return expected;
+  }
+  expected.push_back(Code::ok);
+  return expected;
+}
+
+struct Corrected {
   Vector6 error = Vector6::Zero();  // mm, deg
+  double at_points_mm = 0;          // at the worst application point
   double seconds = 0;               // command to answer, as the robot sees it
 };
 
 class Log {
  public:
-  explicit Log(const DriveOptions& options) : options_(options) {
-    std::printf("\n%5s | %-47s | %-47s | %-21s | %6s\n", "car", "correction received (X_O0O: mm, deg)",
+  Log(const DriveOptions& options, const Job& job) : options_(options), job_(job) {
+    std::printf("\n%5s | %-47s | %-47s | %-21s | %6s\n", "part", "correction received (X_O0O: mm, deg)",
                 "truth", "worst error mm, deg", "ms");
   }
 
-  void refused(const RobotAnswer& answer) {
-    ++cars_;
-    ++bad_;
-    std::printf("%5d | no correction: %s (code %u)\n", cars_, answer.refusal.c_str(), answer.code);
+  void refused(const Pose& truth, const RobotAnswer& answer) {
+    const bool good = answer.code != 0 && may_be(truth, static_cast<Code>(answer.code));
+    count(good);
+    if (good)
+      std::printf("%5d | beyond its limit and refused: code %u\n", parts_, answer.code);
+    else
+      std::printf("%5d | no correction: %s (code %u)\n", parts_, answer.refusal.c_str(), answer.code);
     std::fflush(stdout);
   }
 
   void corrected(const Pose& truth, const Pose& received, std::chrono::microseconds time) {
-    ++cars_;
-    Car car;
-    car.error = difference(truth, received);
-    car.error.tail<3>() *= degrees_per_radian;
-    car.seconds = std::chrono::duration<double>(time).count();
-    done_.push_back(car);
-    const double mm = car.error.head<3>().cwiseAbs().maxCoeff(),
-                 deg = car.error.tail<3>().cwiseAbs().maxCoeff();
-    const bool good = mm <= options_.max_error_mm && deg <= options_.max_error_deg;
-    if (!good) ++bad_;
-    std::printf("%5d |", cars_);
+    const Corrected part = compared(truth, received, time);
+    done_.push_back(part);
+    const bool good = within_figures(part) && may_be(truth, Code::ok);
+    count(good);
+    std::printf("%5d |", parts_);
     print(received);
     print(truth);
-    std::printf(" %8.4f %9.5f %s | %6.1f\n", mm, deg, good ? "ok" : "!!", 1000 * car.seconds);
+    std::printf(" %8.4f %9.5f %s | %6.1f\n", part.error.head<3>().cwiseAbs().maxCoeff(),
+                part.error.tail<3>().cwiseAbs().maxCoeff(), good ? "ok" : "!!", 1000 * part.seconds);
     std::fflush(stdout);
   }
 
   int summary() {
     if (!done_.empty()) print_figures();
-    std::printf("%d cars, %d not within %.3f mm and %.4f deg\n", cars_, bad_, options_.max_error_mm,
-                options_.max_error_deg);
-    return cars_ > 0 && bad_ == 0 ? 0 : 1;
+    const Vector6& most = options_.max_error;
+    std::printf("%d parts, %d not within %g %g %g mm and %g %g %g deg", parts_, bad_, most(0), most(1),
+                most(2), most(3), most(4), most(5));
+    if (options_.max_error_at_points_mm > 0)
+      std::printf(", %g mm at the application points", options_.max_error_at_points_mm);
+    std::printf("%s\n", options_.beyond_every > 0 ? ", or with a wrong verdict" : "");
+    return parts_ > 0 && bad_ == 0 ? 0 : 1;
   }
 
  private:
+  void count(bool good) {
+    ++parts_;
+    bad_ += good ? 0 : 1;
+  }
+
+  bool may_be(const Pose& truth, Code code) const {
+    const auto expected = expected_codes(numbers_of(truth), job_.requirements.limits, options_.max_error);
+    return std::ranges::find(expected, code) != expected.end();
+  }
+
+  Corrected compared(const Pose& truth, const Pose& received, std::chrono::microseconds time) const {
+    Corrected part;
+    part.error = difference(truth, received);
+    part.error.tail<3>() *= degrees_per_radian;
+    for (const ApplicationPoint& point : job_.application_points)
+      part.at_points_mm =
+          std::max(part.at_points_mm, (received * point.p_O_mm - truth * point.p_O_mm).norm());
+    part.seconds = std::chrono::duration<double>(time).count();
+    return part;
+  }
+
+  bool within_figures(const Corrected& part) const {
+    const double most_mm = options_.max_error_at_points_mm;
+    return (part.error.cwiseAbs().array() <= options_.max_error.array()).all() &&
+           (most_mm <= 0 || part.at_points_mm <= most_mm);
+  }
+
   static void print(const Pose& X_AB) {
     const SixNumbers s = to_six_numbers(X_AB);
     std::printf(" %7.3f %7.3f %7.3f %7.4f %7.4f %7.4f |", s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg,
@@ -116,21 +194,25 @@ class Log {
   void print_figures() {
     Vector6 squares = Vector6::Zero();
     std::vector<double> ms;
-    for (const Car& car : done_) {
-      squares += car.error.cwiseAbs2();
-      ms.push_back(1000 * car.seconds);
+    double at_points_mm = 0;
+    for (const Corrected& part : done_) {
+      squares += part.error.cwiseAbs2();
+      ms.push_back(1000 * part.seconds);
+      at_points_mm = std::max(at_points_mm, part.at_points_mm);
     }
     const Vector6 rms = (squares / static_cast<double>(done_.size())).cwiseSqrt();
     std::sort(ms.begin(), ms.end());
     std::printf("\nRMS error  x %.4f  y %.4f  z %.4f mm   rx %.5f  ry %.5f  rz %.5f deg\n", rms(0), rms(1),
                 rms(2), rms(3), rms(4), rms(5));
+    std::printf("largest error at the application points %.4f mm\n", at_points_mm);
     std::printf("command to answer: median %.1f ms, p99 %.1f ms, worst %.1f ms\n", ms[ms.size() / 2],
                 ms[(ms.size() * 99) / 100], ms.back());
   }
 
-  DriveOptions options_;
-  std::vector<Car> done_;
-  int cars_ = 0, bad_ = 0;
+  const DriveOptions& options_;
+  const Job& job_;
+  std::vector<Corrected> done_;
+  int parts_ = 0, bad_ = 0;
 };
 
 bool wait_until_ready(SimulatedRobot& robot, double seconds, const std::atomic<bool>& stop) {
@@ -147,24 +229,25 @@ bool wait_until_ready(SimulatedRobot& robot, double seconds, const std::atomic<b
 
 int drive(const Cell& cell, const Pose& X_WO0, const ShowObject& show, const DriveOptions& options,
           const std::atomic<bool>& stop) {
-  SimulatedRobot robot(robot_options(cell));
+  SimulatedRobot robot(robot_options(cell, options));
   if (!wait_until_ready(robot, options.ready_within_s, stop)) {
     if (!stop)
       std::fprintf(stderr, "the robot waited %.0f s for the daemon to be ready (zero measurement taken?)\n",
                    options.ready_within_s);
     return 1;
   }
-  const auto job = static_cast<std::uint16_t>(cell.jobs.front().number);
-  Shifts shifts(options);
-  Log log(options);
-  for (int car = 1; !stop && (!options.cars || car <= *options.cars); ++car) {
-    const Pose X_O0O = shifts.next();
+  const Job& job = cell.jobs.front();
+  Parts parts(options, job);
+  Log log(options, job);
+  for (int part = 1; !stop && (!options.parts || part <= *options.parts); ++part) {
+    const Pose X_O0O = parts.next();
     show(X_WO0 * X_O0O);
-    const RobotAnswer answer = robot.measure(job, static_cast<std::uint32_t>(car));
+    const RobotAnswer answer =
+        robot.measure(static_cast<std::uint16_t>(job.number), static_cast<std::uint32_t>(part));
     if (answer.ok() && answer.correction)
       log.corrected(X_O0O, shift_from(cell.robots.front(), X_WO0, *answer.correction), answer.to_answer);
     else
-      log.refused(answer);
+      log.refused(X_O0O, answer);
     if (answer.ok()) robot.acknowledge();
   }
   return log.summary();

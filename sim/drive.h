@@ -1,4 +1,4 @@
-// The robot program of the demo: car after car stops not quite where it was taught, the robot asks for its
+// The robot program of the demo: part after part stops not quite where it was taught, the robot asks for its
 // correction, checks it, and the truth says how good it was.
 #pragma once
 
@@ -6,25 +6,32 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "config/cell.h"
 
 namespace zeropose {
 
+// How parts come and how wrong their corrections may be; the truth file of a cell says it. Six numbers are
+// x y z in mm, rx ry rz in degrees.
 struct DriveOptions {
-  std::optional<int> cars;                           // none: until stopped
-  std::uint64_t seed = 1;                            // of the shifts
-  double shift_mm = 30, turn_deg = 0.2;              // each component uniform within +- this
-  double max_error_mm = 0.4, max_error_deg = 0.012;  // of each component of X_O0O, for each car
-  double ready_within_s = 60;                        // from the start to the robot's first "ready"
+  std::optional<int> parts;         // none: until stopped
+  std::uint64_t seed = 1;           // of the shifts
+  Vector6 shift = Vector6::Zero();  // each component of X_O0O uniform within +- this ...
+  std::vector<Pose> poses;          // ... or these X_O0O, one after the other, again and again
+  int beyond_every = 0;             // every so many parts stands beyond one of the job's limits; 0: none does
+  Vector6 max_error = Vector6::Zero();            // of each component of X_O0O, for each part
+  double max_error_at_points_mm = 0;              // at every application point; 0: any
+  double robot_max_mm = 100, robot_max_deg = 10;  // the robot's own limits of a correction
+  double ready_within_s = 60;                     // from the start to the robot's first "ready"
 };
 
 // Moves the object to X_WO and returns when every camera shows it there.
 using ShowObject = std::function<void(const Pose& X_WO)>;
 
 // Drives the first robot of the cell, whose object stands at X_WO0 when the zero measurement is taken. Prints
-// a line for each car and a summary. Returns the exit status: 0 when every car was corrected within the
-// figures.
+// a line for each part and a summary. Returns the exit status: 0 when every part got its correction within
+// the figures, and those beyond a limit the code of that limit instead.
 int drive(const Cell& cell, const Pose& X_WO0, const ShowObject& show, const DriveOptions& options,
           const std::atomic<bool>& stop);
 

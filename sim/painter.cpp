@@ -7,6 +7,8 @@
 #include <limits>
 #include <numbers>
 
+#include "sim/random.h"
+
 namespace zeropose {
 namespace {
 
@@ -119,6 +121,12 @@ int steps_within(double distance_mm, double mm_per_px) {
 }
 
 }  // namespace
+
+Illumination drawn_light(const CameraModel& camera, double gradient, Random& random) {
+  const Vector2d size(camera.width_px, camera.height_px);
+  const double angle = random.uniform(-std::numbers::pi, std::numbers::pi);
+  return {size / 2, gradient / size.norm() * Vector2d(std::cos(angle), std::sin(angle))};
+}
 
 PixelRays::PixelRays(const CameraModel& camera) : camera_(camera) {
   xy_.reserve(static_cast<std::size_t>(camera.width_px) * static_cast<std::size_t>(camera.height_px));

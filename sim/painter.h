@@ -1,5 +1,5 @@
 // Painting flat things in space into the picture of one camera, one sample per pixel, edges as soft as the
-// blur makes them. Good for everything that need not be exact; round marks are rendered by disc_image.h.
+// blur makes them. Good for everything that need not be exact; marks are rendered by coverage.h.
 #pragma once
 
 #include <cstddef>
@@ -9,6 +9,8 @@
 #include "sim/shapes.h"
 
 namespace zeropose {
+
+class Random;
 
 // How a thing looks. Grey levels where the illumination is 1.
 struct Paint {
@@ -42,6 +44,9 @@ struct Illumination {
     return 1 + slope_per_px.x() * (u - middle_px.x()) + slope_per_px.y() * (v - middle_px.y());
   }
 };
+
+// Of a camera, changing by `gradient` over the picture's diagonal, in a direction that is drawn.
+Illumination drawn_light(const CameraModel& camera, double gradient, Random& random);
 
 // The direction vectors of all pixels of a camera, row by row; NaN where the model has none.
 class PixelRays {

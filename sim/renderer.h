@@ -3,11 +3,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "sim/backdrop.h"
+#include "sim/look.h"
+#include "sim/mark_plates.h"
 #include "sim/painter.h"
 #include "sim/scene.h"
 
@@ -23,17 +25,11 @@ class CameraRenderer {
   std::vector<float> clean_picture(const Pose& X_WO, const Faults& faults = {}) const;
 
  private:
-  // A mark on its plate as this camera sees it now.
-  struct Placed {
-    Pose X_CM = Pose::Identity();
-    bool covered = false;
-  };
-  Placed place(const MarkPlate& plate, const Pose& X_CO, const Faults& faults) const;
-
   PixelRays rays_;
   std::string name_;
   Pose X_CW_;
-  Backdrop backdrop_;
+  std::unique_ptr<const Look> look_;
+  std::vector<MarkPlate> references_;
   double blur_sigma_px_;
 };
 

@@ -39,6 +39,14 @@ std::vector<CalibratedCamera> in_order(const std::vector<CameraOptions>& wanted,
 
 }  // namespace
 
+std::vector<Mark> marks_seen(const std::vector<Mark>& marks, const std::vector<View>& views,
+                             std::size_t camera) {
+  std::vector<Mark> seen;
+  for (const View& view : views)
+    if (view.camera == camera) seen.push_back(marks.at(view.mark));
+  return seen;
+}
+
 Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
   const SimFile truth = load_sim_file(sim_file);
   std::vector<std::string> mistakes;
@@ -52,6 +60,7 @@ Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
   for (const ReferencePoint& point : cell.references.points) scene.fixed_marks.push_back(point.mark);
   scene.fixed_views = cell.references.views;
   scene.X_WO_nominal = job.X_WO_nominal;
+  scene.object = truth.object;
   scene.picture = truth.picture;
   return scene;
 }

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "calib/camera_model.h"
@@ -14,10 +15,30 @@
 
 namespace zeropose {
 
+// What the object looks like: one of these.
+
+// A car body: discs, each on a plate of its own, before an underbody.
+struct PlatesObject {};
+
+// A steel sheet on a conveyor: the polygon in z = 0 of O, with the job's discs as holes and its corners among
+// the polygon's. z points to the cameras.
+struct SheetObject {
+  std::vector<Eigen::Vector2d> outline_mm;
+};
+
+// A plate that is lit from behind, across to O's z axis, which points to the camera. The job's balls stand
+// before it on glass pins.
+struct BallPlateObject {
+  Eigen::Vector3d middle_O_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector2d size_mm = Eigen::Vector2d::Zero();
+};
+
+using ObjectTruth = std::variant<PlatesObject, SheetObject, BallPlateObject>;
+
 // Grey levels are those at the middle of the picture, where the illumination is 1.
 struct PictureSettings {
-  double surface_grey = 165;           // of the plates the marks sit on; each plate differs by a few per cent
-  double mark_grey = 60;               // of dark discs; a bright disc has the surface's grey, its plate this
+  double surface_grey = 165;           // of what the marks sit on; each plate differs by a few per cent
+  double mark_grey = 60;               // of dark marks; a bright one has the surface's grey, its plate this
   double illumination_gradient = 0.3;  // change over the picture's diagonal, relative
   double blur_sigma_px = 0.7;          // Gaussian
   double noise_sigma_grey = 2;
@@ -34,8 +55,13 @@ struct Scene {
   std::vector<Mark> fixed_marks;
   std::vector<View> fixed_views;
   Pose X_WO_nominal = Pose::Identity();
+  ObjectTruth object;
   PictureSettings picture;
 };
+
+// Those of the marks that a camera sees.
+std::vector<Mark> marks_seen(const std::vector<Mark>& marks, const std::vector<View>& views,
+                             std::size_t camera);
 
 // What is wrong with marks and cameras for a while.
 struct Faults {

@@ -1,5 +1,8 @@
 #include "sim/sim_file.h"
 
+#include <algorithm>
+#include <array>
+
 #include "config/cameras.h"
 #include "config/files.h"
 #include "config/json_reader.h"
@@ -22,6 +25,59 @@ PictureSettings read_picture(JsonObject& object) {
   return picture;
 }
 
+SheetObject read_sheet(JsonObject& object) {
+  SheetObject sheet;
+  std::vector<Eigen::Vector3d> outline;
+  if (!object.read("outline_mm", outline, 1e5)) return sheet;
+  const bool flat = std::ranges::all_of(outline, [](const auto& vertex) { return vertex.z() == 0; });
+  if (outline.size() < 3 || !flat)
+    object.add_mistake("outline_mm",
+                       std::to_string(outline.size()) + (flat ? " corners" : " corners in space"),
+                       "at least three [x, y, 0], in the order round the sheet");
+  for (const Eigen::Vector3d& vertex : outline) sheet.outline_mm.emplace_back(vertex.head<2>());
+  return sheet;
+}
+
+BallPlateObject read_ball_plate(JsonObject& object) {
+  BallPlateObject plate;
+  object.read("middle_mm", plate.middle_O_mm, 1e5);
+  if (object.read("size_mm", std::span<double>(plate.size_mm.data(), 2), 1e5) &&
+      !(plate.size_mm.minCoeff() > 0))
+    object.add_mistake("size_mm", "a size that is not above 0", "[width, height]");
+  return plate;
+}
+
+// The words, and who reads the rest.
+ObjectTruth read_object_truth(JsonObject& object) {
+  constexpr std::array<std::string_view, 3> kinds{"plates", "sheet", "ball_plate"};
+  constexpr std::array<ObjectTruth (*)(JsonObject&), 3> readers{
+      [](JsonObject&) -> ObjectTruth { return PlatesObject{}; },
+      [](JsonObject& sheet) -> ObjectTruth { return read_sheet(sheet); },
+      [](JsonObject& plate) -> ObjectTruth { return read_ball_plate(plate); }};
+  std::size_t kind = 0;
+  return object.read_word("kind", kinds, kind) ? readers[kind](object) : PlatesObject{};
+}
+
+void read_components(JsonObject& object, std::string_view key, Vector6& six) {
+  if (object.read(key, std::span<double>(six.data(), 6), 1e5) && six.minCoeff() < 0)
+    object.add_mistake(key, "a number below 0", "six numbers, none below 0");
+}
+
+DriveOptions read_drive(JsonObject& object) {
+  DriveOptions drive;
+  object.read_each_optional("poses", [&](JsonObject& pose) {
+    Pose X_O0O = Pose::Identity();
+    if (pose.read("X_O0O", X_O0O)) drive.poses.push_back(X_O0O);
+  });
+  if (drive.poses.empty()) read_components(object, "shift", drive.shift);
+  object.read_optional("beyond_every", drive.beyond_every, 0, 1000);
+  read_components(object, "max_error", drive.max_error);
+  object.read_optional("max_error_at_points_mm", drive.max_error_at_points_mm, NumberRange{0, 1e5});
+  object.read_optional("robot_max_mm", drive.robot_max_mm, NumberRange{0, 1e5, true});
+  object.read_optional("robot_max_deg", drive.robot_max_deg, NumberRange{0, 180, true});
+  return drive;
+}
+
 }  // namespace
 
 SimFile load_sim_file(const std::filesystem::path& path) {
@@ -30,6 +86,8 @@ SimFile load_sim_file(const std::filesystem::path& path) {
   SimFile file;
   read_object(tree, "", reading, [&](JsonObject& top) {
     top.read("cameras", [&](JsonObject& cameras) { file.cameras = read_cameras(cameras); });
+    top.read_optional("object", [&](JsonObject& object) { file.object = read_object_truth(object); });
+    top.read_optional("drive", [&](JsonObject& drive) { file.drive = read_drive(drive); });
     top.read("picture", [&](JsonObject& picture) { file.picture = read_picture(picture); });
   });
   reading.throw_if_wrong();

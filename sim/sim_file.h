@@ -2,19 +2,23 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "calib/camera_model.h"
+#include "sim/drive.h"
 #include "sim/scene.h"
 
 namespace zeropose {
 
 struct SimFile {
   std::vector<CalibratedCamera> cameras;  // in the order of the file
+  ObjectTruth object;
   PictureSettings picture;
+  std::optional<DriveOptions> drive;
 };
 
 // JSON with comments. Throws ConfigError with all mistakes: unreadable file, unknown or missing keys, wrong

@@ -21,6 +21,7 @@ DOORS = {
     ("sim", "protocol/conventions.h"),
     ("sim", "protocol/report.h"),
     ("sim", "protocol/line_socket.h"),
+    ("sim", "measure/code.h"),
     ("sim", "measure/job.h"),
 }
 # What a pure room must not know.

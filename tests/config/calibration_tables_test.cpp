@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "temporary_directory.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 namespace {
@@ -16,12 +16,12 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 std::vector<CalibrationPoint> points_in(const std::string& text) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   return load_calibration_points(directory.write("points.csv", text));
 }
 
 CalibrationViews views_in(const std::string& text) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   return load_calibration_views(directory.write("views.csv", text));
 }
 

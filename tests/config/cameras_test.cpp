@@ -5,7 +5,7 @@
 
 #include "config/cameras_json.h"
 #include "config/files.h"
-#include "temporary_directory.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 namespace {
@@ -38,7 +38,7 @@ std::vector<std::string> mistakes_in(const std::string& text) {
 }
 
 TEST(Cameras, ComeBackFromAFileInTheirOrder) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_cameras(directory.path() / "c.json", {division_camera(), brown_camera()});
   const std::vector<CalibratedCamera> cameras = load_cameras(directory.path() / "c.json");
   ASSERT_EQ(cameras.size(), 2U);

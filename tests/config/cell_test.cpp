@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "example_cell.h"
-#include "temporary_directory.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 namespace {
@@ -459,7 +459,7 @@ std::string load_error(const std::filesystem::path& path) {
 }
 
 TEST(Cell, FilesThatCannotBeRead) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const std::string where = directory.path().string();
   EXPECT_THAT(load_error(directory.path() / "none.json"),
               HasSubstr(where + "/none.json: found no such file"));

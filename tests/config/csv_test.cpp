@@ -5,7 +5,7 @@
 
 #include "config/closest.h"
 #include "config/tables.h"
-#include "temporary_directory.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 namespace {
@@ -104,7 +104,7 @@ TEST(Csv, ClosestWord) {
 }
 
 std::string observation_error(const std::string& text) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const std::vector<CalibratedCamera> cameras{{"left", {}, Pose::Identity()}};
   std::vector<Mark> marks(2);
   marks[0].name = "a";
@@ -118,7 +118,7 @@ std::string observation_error(const std::string& text) {
 }
 
 TEST(Tables, ObservationsFindTheirCamerasAndMarks) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const std::vector<CalibratedCamera> cameras{{"left", {}, Pose::Identity()},
                                               {"right", {}, Pose::Identity()}};
   std::vector<Mark> marks(2);

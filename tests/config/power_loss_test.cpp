@@ -18,7 +18,7 @@
 #include <system_error>
 
 #include "config/records.h"
-#include "temporary_directory.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 namespace {
@@ -91,7 +91,7 @@ class FaultyCalls : public FileCalls {
 };
 
 TEST(PowerLoss, StepsComeInTheOrderThatSurvives) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_zero(directory.path(), record_of_frames(1));
   FaultyCalls calls;
   save_zero(directory.path(), record_of_frames(2), calls);
@@ -109,14 +109,14 @@ TEST(PowerLoss, StepsComeInTheOrderThatSurvives) {
 TEST(PowerLoss, EveryFailingCallIsReportedAndTheOldFileStays) {
   FaultyCalls counting;
   {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     save_zero(directory.path(), record_of_frames(1));
     save_zero(directory.path(), record_of_frames(2), counting);
   }
   const std::size_t steps = counting.log.size();
   ASSERT_GT(steps, 10U);
   for (std::size_t at = 1; at < steps; ++at) {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     save_zero(directory.path(), record_of_frames(1));
     FaultyCalls calls;
     calls.fail_at = at;
@@ -133,7 +133,7 @@ TEST(PowerLoss, EveryFailingCallIsReportedAndTheOldFileStays) {
 }
 
 TEST(PowerLoss, MessageNamesStepFileAndCause) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   try {
     save_zero(directory.path() / "missing", record_of_frames(1));
     FAIL();
@@ -147,13 +147,13 @@ TEST(PowerLoss, MessageNamesStepFileAndCause) {
 TEST(PowerLoss, KilledBetweenAnyTwoCallsTheFileIsOldOrNew) {
   FaultyCalls counting;
   {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     save_zero(directory.path(), record_of_frames(1));
     save_zero(directory.path(), record_of_frames(2), counting);
   }
   bool seen_new = false;
   for (std::size_t at = 1; at <= counting.calls_made; ++at) {
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     save_zero(directory.path(), record_of_frames(1));
     const pid_t child = fork();
     if (child == 0) {
@@ -211,7 +211,7 @@ TEST(PowerLoss, KilledAtEverySystemCallTheFileIsOldOrNew) {
   int stops = 0;
   for (; !ended; ++stops) {
     ASSERT_LT(stops, 5000);
-    const TemporaryDirectory directory;
+    const TemporaryFolder directory;
     save_zero(directory.path(), record_of_frames(1));
     const std::string old_text = text_of_file(zero_path(directory.path(), "body"));
     ended = save_killed_after(stops, directory.path());
@@ -248,7 +248,7 @@ class SharedCount {
 // At any time while zeros are saved one after the other: what is there is the one that was reported last, or
 // the one after it.
 void expect_no_zero_is_lost(int kills) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   std::mt19937 generator(5);
   SharedCount saved;
   save_zero(directory.path(), record_of_frames(*saved = 1));
@@ -304,7 +304,7 @@ int save_on_a_full_disk(const std::filesystem::path& directory) {
 }
 
 TEST(PowerLoss, FullDiskIsReportedAndTheOldFileStays) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const pid_t child = fork();
   if (child == 0) {
     int result = 9;

@@ -7,7 +7,7 @@
 #include <random>
 
 #include "config/files.h"
-#include "temporary_directory.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 namespace {
@@ -68,7 +68,7 @@ std::string error_of(const std::filesystem::path& directory, const std::string& 
 }
 
 TEST(Records, ComeBackBitForBit) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   for (unsigned seed = 1; seed <= 50; ++seed) {
     const ZeroRecord record = example(seed);
     const std::uint32_t id = save_zero(directory.path(), record);
@@ -82,7 +82,7 @@ TEST(Records, ComeBackBitForBit) {
 }
 
 TEST(Records, ExtremeNumbersComeBack) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   ZeroRecord record = example(1);
   record.zero.X_WO0.translation() = Eigen::Vector3d(std::numeric_limits<double>::denorm_min(), -0.0, 1.0 / 3);
   record.zero.compensation_O_mm = {{std::nextafter(1.0, 2.0), 1e-300, -999999.9999999999}};
@@ -94,13 +94,13 @@ TEST(Records, ExtremeNumbersComeBack) {
 }
 
 TEST(Records, MissingIsNothing) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   EXPECT_FALSE(load_zero(directory.path(), "body"));
   EXPECT_FALSE(load_zero(directory.path() / "no such directory", "body"));
 }
 
 TEST(Records, ThePreviousOneIsKept) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const std::filesystem::path path = zero_path(directory.path(), "body");
   save_zero(directory.path(), example(1));
   EXPECT_FALSE(std::filesystem::exists(previous_of(path)));
@@ -112,7 +112,7 @@ TEST(Records, ThePreviousOneIsKept) {
 }
 
 TEST(Records, EveryJobHasItsFile) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   const std::vector<std::string> jobs{
       "body", "Body", "../body", "a/b", "a%2Fb", "tür 1", std::string(200, 'x'), std::string(199, 'x') + "y"};
   for (const std::string& job : jobs) {
@@ -129,7 +129,7 @@ TEST(Records, EveryJobHasItsFile) {
 
 // The law of the checksum: no single byte of the file may change unnoticed.
 TEST(Records, EveryDamagedByteIsNoticed) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_zero(directory.path(), example(7));
   const std::filesystem::path path = zero_path(directory.path(), "body");
   const std::string good = text_of_file(path);
@@ -148,7 +148,7 @@ TEST(Records, EveryDamagedByteIsNoticed) {
 }
 
 TEST(Records, EveryTruncationIsNoticed) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_zero(directory.path(), example(7));
   const std::filesystem::path path = zero_path(directory.path(), "body");
   for (std::size_t length = std::filesystem::file_size(path); length-- > 0;) {
@@ -158,7 +158,7 @@ TEST(Records, EveryTruncationIsNoticed) {
 }
 
 TEST(Records, WhatIsWrongIsNamed) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_zero(directory.path(), example(7));
   const std::filesystem::path path = zero_path(directory.path(), "body");
   const std::string good = text_of_file(path);
@@ -176,7 +176,7 @@ TEST(Records, WhatIsWrongIsNamed) {
 }
 
 TEST(Records, ZeroOfAnotherJobIsRefused) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_zero(directory.path(), example(7));
   std::filesystem::copy(zero_path(directory.path(), "body"), zero_path(directory.path(), "door"));
   EXPECT_THAT(error_of(directory.path(), "door"),
@@ -184,7 +184,7 @@ TEST(Records, ZeroOfAnotherJobIsRefused) {
 }
 
 TEST(Records, WhatCannotBeReadBackIsNotSaved) {
-  const TemporaryDirectory directory;
+  const TemporaryFolder directory;
   save_zero(directory.path(), example(1));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   std::vector<ZeroRecord> bad(6, example(2));
@@ -218,7 +218,7 @@ class ZeroForACell : public testing::Test {
     EXPECT_EQ(stored.reason.empty(), code == Code::ok);
   }
 
-  TemporaryDirectory directory;
+  TemporaryFolder directory;
   Cell cell;
   Job job;
 };

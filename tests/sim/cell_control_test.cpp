@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "tests/sim/car_body.h"
+#include "tests/sim/example_cells.h"
 
 namespace zeropose {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "car_body.h"
+#include "example_cells.h"
 #include "sim/backdrop.h"
 
 namespace zeropose {

@@ -57,9 +57,9 @@ int run(const std::vector<std::string>& arguments) {
   if (arguments[2] == "wrong-calibration") {
     const SimFile truth = load_sim_file(arguments[1]);
     std::cout << calibration_text(wrong_calibration(truth.cameras, {}, std::stoull(arguments.at(3))),
-                                  "What the daemon believes: the true cameras of car-body.sim.json with the "
-                                  "errors of wrong_calibration(), seed " +
-                                      arguments[3] + ".");
+                                  "What the daemon believes: the true cameras of " +
+                                      std::filesystem::path(arguments[1]).filename().string() +
+                                      " with the errors of wrong_calibration(), seed " + arguments[3] + ".");
     return 0;
   }
   const std::set<std::string> options(arguments.begin() + 3, arguments.end());

@@ -4,58 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <thread>
 
-#include "car_body.h"
+#include "example_cells.h"
+#include "outline.h"
 #include "sim/random.h"
 
 namespace zeropose {
 namespace {
 
 using Eigen::Vector2d;
-using Eigen::Vector3d;
+using test::Outline;
+using test::outline_of;
 using Picture = std::vector<float>;
-
-// Any two unit vectors across the normal.
-Eigen::Matrix<double, 3, 2> plane_of(const Vector3d& normal) {
-  Eigen::Matrix<double, 3, 2> axes;
-  axes.col(0) = normal.unitOrthogonal();
-  axes.col(1) = normal.normalized().cross(Vector3d(axes.col(0)));
-  return axes;
-}
-
-// The projected outline of a mark: points all round, its area centroid, its largest radius.
-struct Outline {
-  std::vector<Vector2d> points;
-  Vector2d centroid = Vector2d::Zero();
-  double radius_px = 0;
-};
-
-Outline outline_of(const CalibratedCamera& camera, const Mark& mark, const Pose& X_WO) {
-  constexpr int count = 720;
-  const Pose X_CO = camera.X_WC.inverse() * X_WO;
-  const auto axes = plane_of(mark.normal_O);
-  Outline outline;
-  for (int i = 0; i < count; ++i) {
-    const double angle = 2 * std::numbers::pi * i / count;
-    const Vector3d p_O = mark.p_O_mm + mark.radius_mm * (axes * Vector2d(std::cos(angle), std::sin(angle)));
-    outline.points.push_back(project(camera.model, X_CO * p_O).value());
-  }
-  double area = 0;
-  Vector2d moment = Vector2d::Zero();
-  const Vector2d origin = outline.points.front();
-  for (std::size_t i = 0; i < count; ++i) {
-    const Vector2d a = outline.points[i] - origin, b = outline.points[(i + 1) % count] - origin;
-    const double cross = a.x() * b.y() - a.y() * b.x();
-    area += cross / 2;
-    moment += cross / 6 * (a + b);
-  }
-  outline.centroid = origin + moment / area;
-  for (const Vector2d& point : outline.points)
-    outline.radius_px = std::max(outline.radius_px, (point - outline.centroid).norm());
-  return outline;
-}
 
 // Distance to the outline, negative inside.
 double distance_px(const Outline& outline, const Vector2d& u_px) {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <fstream>
 
-#include "car_body.h"
+#include "example_cells.h"
 #include "sim/sim_file.h"
 
 namespace zeropose {

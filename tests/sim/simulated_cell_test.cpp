@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tests/sim/car_body.h"
+#include "tests/sim/example_cells.h"
 
 namespace zeropose {
 namespace {

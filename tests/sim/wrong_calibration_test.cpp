@@ -5,8 +5,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "car_body.h"
 #include "config/cameras.h"
+#include "example_cells.h"
 #include "sim/sim_file.h"
 
 namespace zeropose {
@@ -75,10 +75,12 @@ TEST(WrongCalibration, NoSigmaNoError) {
   EXPECT_LT(difference(truth[0].X_WC, wrong_calibration(truth, none, 1)[0].X_WC).norm(), 1e-12);
 }
 
+class ExampleCell : public testing::TestWithParam<const char*> {};
+
 // The file that the daemon believes.
-TEST(WrongCalibration, CarBodysCalibrationFileIsThatOfSeedOne) {
-  const auto wrong = wrong_calibration(load_sim_file(cells + "car-body.sim.json").cameras, {}, 1);
-  const auto believed = load_cameras(cells + "car-body.calibration.json");
+TEST_P(ExampleCell, HasTheCalibrationOfSeedOne) {
+  const auto wrong = wrong_calibration(load_sim_file(cells + GetParam() + ".sim.json").cameras, {}, 1);
+  const auto believed = load_cameras(cells + GetParam() + ".calibration.json");
   ASSERT_EQ(believed.size(), wrong.size());
   for (std::size_t camera = 0; camera < wrong.size(); ++camera) {
     const CameraModel &a = believed[camera].model, &b = wrong[camera].model;
@@ -94,13 +96,15 @@ TEST(WrongCalibration, CarBodysCalibrationFileIsThatOfSeedOne) {
   }
 }
 
-TEST(WrongCalibration, CarBodysCalibrationFileSaysWhatItIs) {
-  std::ifstream file(cells + "car-body.calibration.json");
+TEST_P(ExampleCell, SaysWhatItsCalibrationIs) {
+  std::ifstream file(cells + GetParam() + ".calibration.json");
   std::string first_line;
   std::getline(file, first_line);
   EXPECT_TRUE(first_line.starts_with("//")) << first_line;
   EXPECT_NE(first_line.find("seed 1"), std::string::npos) << first_line;
 }
+
+INSTANTIATE_TEST_SUITE_P(All, ExampleCell, testing::Values("car-body", "press-shop", "gun-check"));
 
 }  // namespace
 }  // namespace zeropose
