@@ -83,9 +83,10 @@ int run(const Options& options) {
   std::fprintf(stderr, "zeropose-cell: serving %zu cameras of cell %s\n", cell.cameras.size(),
                cell.name.c_str());
   if (options.drives)
-    return drive(
-        cell, X_WO_nominal, [&simulated](const Pose& X_WO) { simulated.show(X_WO); }, drive_options(options),
-        signals.stopped());
+    return drive(cell, X_WO_nominal,
+                 {[&simulated](const Pose& X_WO) { simulated.show(X_WO); },
+                  [&simulated](std::size_t robot, const Pose& X_RH) { simulated.move_hand(robot, X_RH); }},
+                 drive_options(options), signals.stopped());
   signals.stopped().wait(false);
   return 0;
 }

@@ -215,22 +215,89 @@ class Log {
   int parts_ = 0, bad_ = 0;
 };
 
-bool wait_until_ready(SimulatedRobot& robot, double seconds, const std::atomic<bool>& stop) {
+// The robot goes through the job's positions and tells each.
+class Tour {
+ public:
+  Tour(const Cell& cell, const DrivenCell& driven, const DriveOptions& options, SimulatedRobot& robot)
+      : cell_(cell),
+        job_(cell.jobs.front()),
+        driven_(driven),
+        errors_(options.robot),
+        robot_(robot),
+        noise_(options.seed + 1000) {
+    std::mt19937_64 fixed(options.seed + 2000);
+    for (std::size_t i = 0; i < job_.positions.size(); ++i)
+      absolute_.push_back(delta(errors_.absolute_mm, errors_.absolute_deg, fixed));
+  }
+
+  // The answer that ended it; ok when every position was taken.
+  RobotAnswer go(std::uint32_t part) {
+    RobotAnswer answer;
+    answer.refusal.clear();
+    for (std::size_t i = 0; i < job_.positions.size() && answer.ok(); ++i) {
+      const Pose& X_RH = job_.positions[i].X_RH;
+      const Vector6 off = absolute_[i] + delta(errors_.repeatability_mm, errors_.repeatability_deg, noise_);
+      driven_.move_hand(*cell_.hand_of[job_.positions[i].camera], moved(X_RH, off));
+      answer = robot_.at_position(static_cast<std::uint16_t>(job_.number), part,
+                                  static_cast<std::int32_t>(i + 1), X_RH);
+    }
+    return answer;
+  }
+
+ private:
+  static Vector6 delta(double mm, double deg, std::mt19937_64& generator) {
+    std::normal_distribution<double> normal;
+    Vector6 delta;
+    for (Eigen::Index i = 0; i < 6; ++i)
+      delta(i) = normal(generator) * (i < 3 ? mm : deg / degrees_per_radian);
+    return delta;
+  }
+
+  const Cell& cell_;
+  const Job& job_;
+  const DrivenCell& driven_;
+  RobotErrors errors_;
+  SimulatedRobot& robot_;
+  std::mt19937_64 noise_;
+  std::vector<Vector6> absolute_;
+};
+
+// Tries until it is done, the time is up, or it shall stop.
+bool done_within(double seconds, const std::atomic<bool>& stop, const std::function<bool()>& done) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
   while (!stop && Clock::now() < deadline) {
-    const RobotAnswer seen = robot.read();
-    if (seen.block.state == LinkState::ready && seen.block.has(status_bit::ready)) return true;
+    if (done()) return true;
     std::this_thread::sleep_for(100ms);
   }
   return false;
 }
 
+// From the pictures of as many rounds as the cell averages over.
+RobotAnswer zero_from_hand(const Cell& cell, Tour& tour, SimulatedRobot& robot) {
+  RobotAnswer answer;
+  answer.refusal.clear();
+  for (int round = 0; round < cell.zero_frames && answer.ok(); ++round) answer = tour.go(0);
+  return answer.ok() ? robot.zero(static_cast<std::uint16_t>(cell.jobs.front().number)) : answer;
+}
+
+bool is_ready(SimulatedRobot& robot) {
+  const ResultBlock block = robot.read().block;
+  return block.state == LinkState::ready && block.has(status_bit::ready);
+}
+
 }  // namespace
 
-int drive(const Cell& cell, const Pose& X_WO0, const ShowObject& show, const DriveOptions& options,
+int drive(const Cell& cell, const Pose& X_WO0, const DrivenCell& driven, const DriveOptions& options,
           const std::atomic<bool>& stop) {
   SimulatedRobot robot(robot_options(cell, options));
-  if (!wait_until_ready(robot, options.ready_within_s, stop)) {
+  Tour tour(cell, driven, options, robot);
+  RobotAnswer zero;
+  if (!cell.jobs.front().positions.empty() && !done_within(options.ready_within_s, stop, [&] {
+        zero = zero_from_hand(cell, tour, robot);
+        return zero.ok();
+      }))
+    std::fprintf(stderr, "no zero measurement: %s (code %u)\n", zero.refusal.c_str(), zero.code);
+  if (!done_within(options.ready_within_s, stop, [&] { return is_ready(robot); })) {
     if (!stop)
       std::fprintf(stderr, "the robot waited %.0f s for the daemon to be ready (zero measurement taken?)\n",
                    options.ready_within_s);
@@ -241,9 +308,10 @@ int drive(const Cell& cell, const Pose& X_WO0, const ShowObject& show, const Dri
   Log log(options, job);
   for (int part = 1; !stop && (!options.parts || part <= *options.parts); ++part) {
     const Pose X_O0O = parts.next();
-    show(X_WO0 * X_O0O);
-    const RobotAnswer answer =
-        robot.measure(static_cast<std::uint16_t>(job.number), static_cast<std::uint32_t>(part));
+    driven.show(X_WO0 * X_O0O);
+    RobotAnswer answer = tour.go(static_cast<std::uint32_t>(part));
+    if (answer.ok())
+      answer = robot.measure(static_cast<std::uint16_t>(job.number), static_cast<std::uint32_t>(part));
     if (answer.ok() && answer.correction)
       log.corrected(X_O0O, shift_from(cell.robots.front(), X_WO0, *answer.correction), answer.to_answer);
     else

@@ -12,6 +12,12 @@
 
 namespace zeropose {
 
+// How far the hand stands from where the robot says: each time anew, and always alike at one place.
+struct RobotErrors {
+  double repeatability_mm = 0.05, repeatability_deg = 0.003;
+  double absolute_mm = 0.5, absolute_deg = 0.02;
+};
+
 // How parts come and how wrong their corrections may be; the truth file of a cell says it. Six numbers are
 // x y z in mm, rx ry rz in degrees.
 struct DriveOptions {
@@ -23,16 +29,22 @@ struct DriveOptions {
   Vector6 max_error = Vector6::Zero();            // of each component of X_O0O, for each part
   double max_error_at_points_mm = 0;              // at every application point; 0: any
   double robot_max_mm = 100, robot_max_deg = 10;  // the robot's own limits of a correction
+  RobotErrors robot;                              // of the hand that carries a camera
   double ready_within_s = 60;                     // from the start to the robot's first "ready"
 };
 
-// Moves the object to X_WO and returns when every camera shows it there.
-using ShowObject = std::function<void(const Pose& X_WO)>;
+// What the drive moves; both return when every camera shows it so.
+struct DrivenCell {
+  std::function<void(const Pose& X_WO)> show;                          // the object
+  std::function<void(std::size_t robot, const Pose& X_RH)> move_hand;  // what a robot carries
+};
 
 // Drives the first robot of the cell, whose object stands at X_WO0 when the zero measurement is taken. Prints
-// a line for each part and a summary. Returns the exit status: 0 when every part got its correction within
-// the figures, and those beyond a limit the code of that limit instead.
-int drive(const Cell& cell, const Pose& X_WO0, const ShowObject& show, const DriveOptions& options,
+// a line for each part and a summary. Where the job has positions for a camera on the robot's hand, the robot
+// goes through them for every part, and takes the zero measurement itself before the first. Returns the exit
+// status: 0 when every part got its correction within the figures, and those beyond a limit the code of that
+// limit instead.
+int drive(const Cell& cell, const Pose& X_WO0, const DrivenCell& driven, const DriveOptions& options,
           const std::atomic<bool>& stop);
 
 }  // namespace zeropose

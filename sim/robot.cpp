@@ -176,19 +176,23 @@ bool SimulatedRobot::read_block(std::vector<std::uint16_t>& registers, RobotAnsw
   return !decoded.problem;
 }
 
-RobotAnswer SimulatedRobot::send(const Command& command) {
-  const CommandRegisters registers = encode_command(command, options_.command_data_id);
+RobotAnswer SimulatedRobot::write(std::uint16_t first, std::span<const std::uint16_t> registers) {
   std::vector<std::uint8_t> pdu{write_multiple_registers};
-  put16(pdu, command_reg::first);
+  put16(pdu, first);
   put16(pdu, registers.size());
   pdu.push_back(static_cast<std::uint8_t>(2 * registers.size()));
   for (const std::uint16_t value : registers) put16(pdu, value);
-  commanded_ = Clock::now();
   const Reply reply = exchange(pdu);
   RobotAnswer answer;
-  answer.request_id = command.request_id;
   answer.refusal = reply.failure;
   answer.exception = reply.exception;
+  return answer;
+}
+
+RobotAnswer SimulatedRobot::send(const Command& command) {
+  commanded_ = Clock::now();
+  RobotAnswer answer = write(command_reg::first, encode_command(command, options_.command_data_id));
+  answer.request_id = command.request_id;
   return answer;
 }
 
@@ -260,6 +264,17 @@ RobotAnswer SimulatedRobot::measure(std::uint16_t job, std::uint32_t part, std::
 
 RobotAnswer SimulatedRobot::zero(std::uint16_t job) {
   return command(CommandKind::zero, job, 0, zero_guard, options_.zero_patience);
+}
+
+RobotAnswer SimulatedRobot::at_position(std::uint16_t job, std::uint32_t part, std::int32_t position,
+                                        const Pose& X_RH) {
+  const auto values = to_wire(options_.convention, X_RH);
+  if (!values) return {};
+  RobotAnswer told =
+      write(position_reg::first,
+            encode_position({static_cast<std::uint32_t>(position), *values}, options_.command_data_id));
+  if (!told.ok()) return told;
+  return command(CommandKind::at_position, job, part, position, options_.patience);
 }
 
 RobotAnswer SimulatedRobot::select_job(std::uint16_t job) {

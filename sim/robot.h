@@ -68,6 +68,8 @@ class SimulatedRobot {
 
   RobotAnswer measure(std::uint16_t job, std::uint32_t part, std::int32_t axis_position_um = 0);
   RobotAnswer zero(std::uint16_t job);
+  // Tells where the hand is; position counts from 1.
+  RobotAnswer at_position(std::uint16_t job, std::uint32_t part, std::int32_t position, const Pose& X_RH);
   RobotAnswer select_job(std::uint16_t job);
   RobotAnswer reset();
   RobotAnswer halt();
@@ -93,6 +95,7 @@ class SimulatedRobot {
   void judge(CommandKind kind, RobotExpectation expected, std::span<const std::uint16_t> registers,
              Clock::time_point read_started, RobotAnswer& answer);
   RobotAnswer send(const Command& command);
+  RobotAnswer write(std::uint16_t first, std::span<const std::uint16_t> registers);
   bool read_block(std::vector<std::uint16_t>& registers, RobotAnswer& answer);
   std::string connect();
   Reply exchange(std::span<const std::uint8_t> pdu);

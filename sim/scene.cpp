@@ -37,6 +37,24 @@ std::vector<CalibratedCamera> in_order(const std::vector<CameraOptions>& wanted,
   return ordered;
 }
 
+// A mark may be seen from several positions of one camera.
+void add_view(std::vector<View>& views, const View& view) {
+  const bool known = std::ranges::any_of(
+      views, [&](const View& other) { return other.camera == view.camera && other.mark == view.mark; });
+  if (!known) views.push_back(view);
+}
+
+void put_on_hands(const Cell& cell, const Job& job, Scene& scene) {
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    if (!cell.hand_of[i]) continue;
+    const std::size_t robot = *cell.hand_of[i];
+    scene.hand_cameras.push_back({i, robot, cell.robots[robot].X_WR, scene.cameras[i].X_WC});
+    const auto position = std::ranges::find(job.positions, i, &HandPosition::camera);
+    const Pose X_RH = position == job.positions.end() ? Pose::Identity() : position->X_RH;
+    scene.cameras[i] = virtual_camera(scene.cameras[i], cell.robots[robot].X_WR * X_RH);
+  }
+}
+
 }  // namespace
 
 std::vector<Mark> marks_seen(const std::vector<Mark>& marks, const std::vector<View>& views,
@@ -56,7 +74,9 @@ Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
   if (!mistakes.empty()) throw ConfigError(mistakes);
   const Job& job = cell.jobs.front();
   scene.marks = job.marks;
-  scene.views = job.views;
+  put_on_hands(cell, job, scene);
+  for (const View& view : job.views)
+    add_view(scene.views, {device_of(job, view.camera, cell.cameras.size()), view.mark});
   for (const ReferencePoint& point : cell.references.points) scene.fixed_marks.push_back(point.mark);
   scene.fixed_views = cell.references.views;
   scene.X_WO_nominal = job.X_WO_nominal;

@@ -46,12 +46,19 @@ struct PictureSettings {
   std::uint64_t seed = 1;
 };
 
+// A camera that a robot carries: it stands at X_WR X_RH X_HC.
+struct HandCamera {
+  std::size_t camera = 0, robot = 0;  // of the cell
+  Pose X_WR = Pose::Identity(), X_HC = Pose::Identity();
+};
+
 // The true cameras, in the order of the cell's cameras, the job's marks and views, and the cell's reference
 // points as marks of the world.
 struct Scene {
-  std::vector<CalibratedCamera> cameras;
+  std::vector<CalibratedCamera> cameras;  // one on a hand: where it is at the job's first position
+  std::vector<HandCamera> hand_cameras;
   std::vector<Mark> marks;
-  std::vector<View> views;
+  std::vector<View> views;  // cameras of the cell, whatever position they look from
   std::vector<Mark> fixed_marks;
   std::vector<View> fixed_views;
   Pose X_WO_nominal = Pose::Identity();

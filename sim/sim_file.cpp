@@ -73,6 +73,12 @@ DriveOptions read_drive(JsonObject& object) {
   object.read_optional("beyond_every", drive.beyond_every, 0, 1000);
   read_components(object, "max_error", drive.max_error);
   object.read_optional("max_error_at_points_mm", drive.max_error_at_points_mm, NumberRange{0, 1e5});
+  object.read_optional("robot", [&](JsonObject& robot) {
+    robot.read("repeatability_mm", drive.robot.repeatability_mm, NumberRange{0, 100});
+    robot.read("repeatability_deg", drive.robot.repeatability_deg, NumberRange{0, 10});
+    robot.read("absolute_mm", drive.robot.absolute_mm, NumberRange{0, 100});
+    robot.read("absolute_deg", drive.robot.absolute_deg, NumberRange{0, 10});
+  });
   object.read_optional("robot_max_mm", drive.robot_max_mm, NumberRange{0, 1e5, true});
   object.read_optional("robot_max_deg", drive.robot_max_deg, NumberRange{0, 180, true});
   return drive;

@@ -74,8 +74,14 @@ GigeServer& SimulatedCell::gige(const char* fault) {
   return *gige_;
 }
 
+// A camera on a hand that was moved has moved in the hand.
 void SimulatedCell::render() {
-  pictures_.show(X_WO_, faults_);
+  Faults now = faults_;
+  for (const auto& [camera, X_CoCn] : carried_) {
+    const auto moved = faults_.moved_cameras.find(camera);
+    now.moved_cameras[camera] = moved == faults_.moved_cameras.end() ? X_CoCn : X_CoCn * moved->second;
+  }
+  pictures_.show(X_WO_, now);
   if (gige_) gige_->picture_changed();
   if (v4l2_) v4l2_->picture_changed();
 }
@@ -83,6 +89,16 @@ void SimulatedCell::render() {
 void SimulatedCell::show(const Pose& X_WO) {
   const std::lock_guard lock(mutex_);
   X_WO_ = X_WO;
+  render();
+}
+
+void SimulatedCell::move_hand(std::size_t robot, const Pose& X_RH) {
+  const std::lock_guard lock(mutex_);
+  for (const HandCamera& hand : scene_.hand_cameras) {
+    if (hand.robot != robot) continue;
+    const CalibratedCamera& camera = scene_.cameras[hand.camera];
+    carried_[camera.name] = camera.X_WC.inverse() * hand.X_WR * X_RH * hand.X_HC;
+  }
   render();
 }
 

@@ -45,6 +45,8 @@ class SimulatedCell {
 
   // X_WO. Frames exposed after the return show the object there; the same for all faults.
   void show(const Pose& X_WO);
+  // Moves a robot's hand, and what it carries, to where it truly is.
+  void move_hand(std::size_t robot, const Pose& X_RH);
   Pose pose() const;
   Faults faults() const;
   const Scene& scene() const { return scene_; }
@@ -68,6 +70,7 @@ class SimulatedCell {
   mutable std::mutex mutex_;
   Pose X_WO_;
   Faults faults_;
+  std::map<std::string, Pose> carried_;  // X_CoCn of the cameras on hands, from where they are in the scene
   CellPictures pictures_;
   std::unique_ptr<GigeServer> gige_;  // one of the two
   std::unique_ptr<V4l2Server> v4l2_;
