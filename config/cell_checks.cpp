@@ -87,6 +87,14 @@ void check_requirements(const Cell& cell, const Job& job, const std::string& pat
                                   in_quotes(camera_name(cell, job, camera))}));
 }
 
+// A picture from where nothing is looked for would be asked of the robot for nothing.
+void check_positions(const Cell& cell, const Job& job, const std::string& path, JsonReading& reading) {
+  for (std::size_t i = 0; i < job.positions.size(); ++i)
+    if (std::ranges::find(job.views, cell.cameras.size() + i, &View::camera) == job.views.end())
+      reading.add_mistake(path_of(path + ".positions", i) + ".name", in_quotes(job.positions[i].name),
+                          "a position that at least one mark names in its cameras");
+}
+
 void check_jobs(const Cell& cell, JsonReading& reading) {
   check_unique(cell.jobs, "jobs", "name", name_in_quotes, reading);
   check_unique(
@@ -96,6 +104,7 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
     const std::string path = path_of("jobs", i);
     check_unique(cell.jobs[i].marks, path + ".marks", "name", name_in_quotes, reading);
     check_unique(cell.jobs[i].positions, path + ".positions", "name", name_in_quotes, reading);
+    check_positions(cell, cell.jobs[i], path, reading);
     check_unique(cell.jobs[i].application_points, path + ".application_points", "name", name_in_quotes,
                  reading);
     check_plane(cell.jobs[i], path, reading);

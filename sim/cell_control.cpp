@@ -55,6 +55,12 @@ void shift(SimulatedCell& cell, const Json& question) {
   cell.show(cell.scene().X_WO_nominal * pose(question));
 }
 
+void move_hand(SimulatedCell& cell, const Json& question) {
+  const double robot = number(question, "robot", 1);
+  if (!(robot >= 1)) throw invalid_argument("'robot' counts from 1, in the order of the cell file");
+  cell.move_hand(static_cast<std::size_t>(robot) - 1, pose(question));
+}
+
 // Without a pose by 0.05 degrees about its y axis.
 void move_camera(SimulatedCell& cell, const Json& question) {
   const Pose X_CoCn = question.contains("pose") ? pose(question) : from_six_numbers({0, 0, 0, 0, 0.05, 0});
@@ -100,10 +106,12 @@ Json answer(SimulatedCell& cell, const Json& question) {
   if (command == "truth") return truth(cell);
   if (command == "shift")
     shift(cell, question);
+  else if (command == "hand")
+    move_hand(cell, question);
   else if (command == "fault")
     fault(cell, question);
   else
-    throw invalid_argument("no command '" + command + "'; there are: shift, truth, fault");
+    throw invalid_argument("no command '" + command + "'; there are: shift, hand, truth, fault");
   return {{"status", "ok"}};
 }
 

@@ -4,6 +4,7 @@
 //   {"cmd":"shift","pose":[..]}    the object stands at X_O0O from its nominal pose; answered when every
 //   frame
 //                                  exposed from now on shows it there
+//   {"cmd":"hand","robot":1,"pose":[..]}  the hand of this robot, with what it carries, is at X_RH (robot: 1)
 //   {"cmd":"truth"}                -> X_WO, X_O0O, cameras that run, marks with faults
 //   {"cmd":"fault","kind":KIND, ..}
 //      camera-dead, camera-back    "camera": NAME

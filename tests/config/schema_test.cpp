@@ -44,6 +44,12 @@ Json full_example() {
     "device": "/dev/video0", "input": 1, "fields": "both", "controls": [{"name": "gain", "value": 3}]})");
   json["cameras"][2] = parsed(R"({"name": "camera3", "driver": "folder", "width_px": 768, "height_px": 572,
     "path": "pictures", "loop": true})");
+  json["cameras"].push_back(parsed(R"({"name": "hand", "driver": "folder", "width_px": 768, "height_px": 572,
+    "path": "pictures", "on_hand_of": "robot2"})"));
+  json["jobs"][0]["positions"] = Json::array({parsed(R"({"name": "above", "camera": "hand",
+    "hand_pose": [0, 0, 0, 0, 0, 0], "tolerance_mm": 1, "tolerance_deg": 0.5})")});
+  json["jobs"][0]["positions_within_s"] = 30;
+  json["jobs"][0]["marks"][0]["cameras"].push_back("above");
   json["jobs"][0]["marks"][0]["tolerance_mm"] = 2;
   json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
   json["jobs"][0]["marks"][0]["kind"] = "dark_ring";
@@ -80,11 +86,20 @@ Json full_example() {
   return json;
 }
 
+// With the calibration of its camera on a hand.
+std::vector<std::string> mistakes_of(const Json& full) {
+  Json calibration = example_calibration();
+  calibration["hand"] = calibration["camera1"];
+  calibration["hand"]["X_HC"] = calibration["hand"]["X_WC"];
+  calibration["hand"].erase("X_WC");
+  return mistakes_in(full.dump(), calibration.dump());
+}
+
 // The place of a key in the example: each driver has keys of its own and a camera of its own there, each type
 // of link a robot.
 Json::json_pointer place_of_key(const Json& full, const std::string& pointer) {
   for (const std::string list : {"/cameras/", "/robots/"})
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < 5; ++i) {
       std::string moved = pointer;
       if (moved.starts_with(list + "0/")) moved.replace(0, list.size() + 1, list + std::to_string(i));
       if (full.contains(Json::json_pointer(moved))) return Json::json_pointer(moved);
@@ -113,14 +128,14 @@ TEST(Schema, DescribesEveryKeyAndAllowsNoOther) {
 
 TEST(Schema, RequiresWhatTheLoaderRequires) {
   const Json full = full_example();
-  ASSERT_THAT(mistakes_in(full), IsEmpty());
+  ASSERT_THAT(mistakes_of(full), IsEmpty());
   walk(schema(), "", "",
        [&](const std::string& path, const std::string& pointer, const Json&, bool required) {
          const Json::json_pointer place = place_of_key(full, pointer);
          ASSERT_TRUE(full.contains(place)) << path;
          Json without = full;
          without[place.parent_pointer()].erase(place.back());
-         const std::vector<std::string> mistakes = mistakes_in(without);
+         const std::vector<std::string> mistakes = mistakes_of(without);
          const bool refused = std::any_of(mistakes.begin(), mistakes.end(), [](const std::string& mistake) {
            return mistake.find("found no such key") != std::string::npos;
          });
@@ -132,7 +147,7 @@ TEST(Schema, RequiresWhatTheLoaderRequires) {
 bool refuses(const std::string& pointer, const Json& value) {
   Json json = full_example();
   json[place_of_key(json, pointer)] = value;
-  for (const std::string& mistake : mistakes_in(json))
+  for (const std::string& mistake : mistakes_of(json))
     if (mistake.find("expected a number") != std::string::npos ||
         mistake.find("expected an integer") != std::string::npos)
       return true;

@@ -17,22 +17,20 @@ using Json = nlohmann::json;
 
 constexpr auto start_patience = 60s;  // sanitizers are slow
 
-SimulatedRobotOptions robot_options() {
+SimulatedRobotOptions robot_options(const LineRobot& robot) {
   SimulatedRobotOptions options;
-  options.convention = Convention::kuka;
+  options.port = robot.port;
+  options.convention = robot.convention;
   options.frame = 3;
   options.first_request_id = 1000;
   return options;
 }
 
-RecorderOptions recorder_options() {
+RecorderOptions recorder_options(const LineRobot& robot) {
   RecorderOptions options;
-  options.convention = Convention::kuka;
+  options.convention = robot.convention;
   return options;
 }
-
-// Of the robot in the cell file. The nominal pose, where the zero is taken, is the identity.
-Pose robot_in_world() { return from_six_numbers({1200, -2400, -150, 0, 0, 90}); }
 
 }  // namespace
 
@@ -41,11 +39,12 @@ std::string program_path(const std::string& name) {
   return (tools != nullptr ? tools : std::string(ZEROPOSE_BIN_DIR)) + "/" + name;
 }
 
-WalkingLine::WalkingLine(std::filesystem::path cell)
+WalkingLine::WalkingLine(std::filesystem::path cell, const LineRobot& robot)
     : cell_(std::move(cell)),
+      line_robot_(robot),
       notify_(folder_ / "notify.sock"),
-      robot_(robot_options()),
-      recorder_(recorder_options()) {}
+      robot_(robot_options(robot)),
+      recorder_(recorder_options(robot)) {}
 
 void WalkingLine::start_cell() {
   cell_process = std::make_unique<Process>(
@@ -67,7 +66,7 @@ void WalkingLine::start_daemon() {
                                "WATCHDOG_USEC=2000000"});
   if (!notify_.heard("READY=1", start_patience))
     throw std::runtime_error("the daemon is not READY:\n" + daemon_log());
-  if (!watched_) recorder_.watch("127.0.0.1", 1502);
+  if (!watched_) recorder_.watch("127.0.0.1", line_robot_.port);
   watched_ = true;
 }
 
@@ -89,11 +88,11 @@ void WalkingLine::take_zero() {
   if (zero.status != 0) throw std::runtime_error("no zero: " + zero.out + zero.err);
 }
 
-RobotAnswer WalkingLine::measure() {
+RobotAnswer WalkingLine::measure(std::optional<std::uint32_t> part) {
   const std::uint32_t id = robot_.next_request_id();
   recorder_.requested(id);
   recorder_.truth(id, correction_of(X_WO_), correction_error_mm(), 2 * line_error_deg);
-  return robot_.measure(1, id);
+  return robot_.measure(1, part.value_or(id));
 }
 
 RobotAnswer WalkingLine::acknowledge() {
@@ -132,16 +131,16 @@ Finished WalkingLine::zeropose(std::vector<std::string> arguments) const {
 }
 
 Pose WalkingLine::correction_of(const Pose& X_WO) const {
-  const Pose X_WR = robot_in_world();
+  const Pose& X_WR = line_robot_.X_WR;
   return X_WR.inverse() * X_WO * X_WR;
 }
 
 double WalkingLine::correction_error_mm() const {
-  return line_error_mm + robot_in_world().translation().norm() * line_error_deg / degrees_per_radian;
+  return line_error_mm + line_robot_.X_WR.translation().norm() * line_error_deg / degrees_per_radian;
 }
 
 Pose WalkingLine::shift_from(const Pose& D_R) const {
-  const Pose X_WR = robot_in_world();
+  const Pose& X_WR = line_robot_.X_WR;
   return X_WR * D_R * X_WR.inverse();
 }
 

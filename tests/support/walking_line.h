@@ -21,11 +21,19 @@ inline constexpr double line_error_mm = 0.4, line_error_deg = 0.012;
 // is slow under a sanitizer needs a cell that keeps its times.
 std::string program_path(const std::string& name);
 
+// The robot of a line's cell: unit 1 on a port of its own, with robot-base shifts.
+struct LineRobot {
+  std::uint16_t port = 1502;
+  Convention convention = Convention::kuka;
+  Pose X_WR = from_six_numbers({1200, -2400, -150, 0, 0, 90});
+};
+
 // Files live in `folder`: state/, control and notify sockets, logs.
 class WalkingLine {
  public:
   explicit WalkingLine(std::filesystem::path cell = std::filesystem::path(ZEROPOSE_SOURCE_DIR) /
-                                                    "config/cells/car-body.json");
+                                                    "config/cells/car-body.json",
+                       const LineRobot& robot = {});
 
   void start_cell();
   void start_daemon();      // and waits for READY=1
@@ -41,12 +49,12 @@ class WalkingLine {
 
   SimulatedRobot& robot() { return robot_; }
   // The robot's Measure and Acknowledge, told to the recorder with the truth.
-  RobotAnswer measure();
+  RobotAnswer measure(std::optional<std::uint32_t> part = {});  // none: the request's number
   RobotAnswer acknowledge();
   // Watches from the first start of the daemon.
   Recorder& recorder() { return recorder_; }
   // The robot-base shift that a robot must be sent for an object at X_WO, and how far it may be off: the
-  // error of the rotation moves the robot's origin, which is 2.7 m away from the object's.
+  // error of the rotation moves the robot's origin, which lies away from the object's.
   Pose correction_of(const Pose& X_WO) const;
   double correction_error_mm() const;
   // The robot-base shift that the robot was sent, as X_O0O.
@@ -62,6 +70,7 @@ class WalkingLine {
  private:
   TemporaryFolder folder_;
   std::filesystem::path cell_;
+  LineRobot line_robot_;
   NotifyListener notify_;
   SimulatedRobot robot_;
   Recorder recorder_;

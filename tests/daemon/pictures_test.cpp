@@ -1,0 +1,118 @@
+// The pictures of a camera on a robot's hand: from where, of which part, how old.
+#include "daemon/pictures.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace zeropose {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+class Hands : public testing::Test {
+ protected:
+  Frame frame(std::uint8_t grey, TimePoint received = TimePoint(100s)) const {
+    Frame frame;
+    frame.width_px = 4, frame.height_px = 2, frame.stride_bytes = 4;
+    frame.received = received;
+    frame.pixels = own_pixels(std::vector<std::uint8_t>(8, grey));
+    return frame;
+  }
+  void take(std::size_t position, std::uint32_t part, std::uint8_t grey = 1,
+            const Pose& X_RH = Pose::Identity()) {
+    hands.take(position, part, X_RH, frame(grey), 3);
+  }
+  std::string missing(std::optional<std::uint32_t> part, TimePoint now = TimePoint(100s)) const {
+    return hands.missing(job, part, now);
+  }
+
+  const Cell cell = load_cell(ZEROPOSE_SOURCE_DIR "/config/cells/hand-camera.json");
+  const Job& job = cell.jobs.front();
+  HandPictures hands;
+};
+
+TEST_F(Hands, EveryPositionIsNeeded) {
+  EXPECT_THAT(missing(7), HasSubstr("from front left, front right, rear right, rear left"));
+  for (const std::size_t position : {0u, 1u, 3u}) take(position, 7);
+  EXPECT_EQ(missing(7), "no picture of this part from rear right");
+  EXPECT_EQ(hands.rounds(job), 0u);
+  take(2, 7);
+  EXPECT_EQ(missing(7), "");
+  EXPECT_EQ(missing({}), "");
+  EXPECT_EQ(hands.rounds(job), 1u);
+  hands.forget();
+  EXPECT_NE(missing(7), "");
+}
+
+TEST_F(Hands, PicturesOfAnotherPartAreNoneAtAll) {
+  for (std::size_t position = 0; position < 4; ++position) take(position, 7);
+  EXPECT_NE(missing(8), "");
+  take(0, 8);
+  EXPECT_EQ(missing(8), "no picture of this part from front right, rear right, rear left");
+  EXPECT_NE(missing(7), "");
+}
+
+TEST_F(Hands, OldPicturesAreNamed) {
+  for (std::size_t position = 0; position < 4; ++position) take(position, 7);
+  EXPECT_EQ(missing(7, TimePoint(129s)), "");
+  EXPECT_THAT(missing(7, TimePoint(131s)), HasSubstr("front left (too long ago)"));
+}
+
+TEST_F(Hands, RoundsAreKeptNewestFirstWhileTheHandComesBack) {
+  for (std::uint8_t round = 1; round <= 5; ++round)
+    for (std::size_t position = 0; position < 4; ++position) take(position, 0, round);
+  EXPECT_EQ(hands.rounds(job), 3u);
+  EXPECT_EQ(hands.frames(job, 0)[2].row(0)[0], 5);
+  EXPECT_EQ(hands.frames(job, 2)[2].row(1)[3], 3);
+  const Pose elsewhere = from_six_numbers({0.6, 0, 0, 0, 0, 0});
+  take(2, 0, 9, elsewhere);
+  EXPECT_EQ(hands.rounds(job), 1u);
+  EXPECT_EQ(hands.frames(job, 0)[2].row(0)[0], 9);
+  EXPECT_TRUE(hands.hands(job)[2].isApprox(elsewhere));
+}
+
+class Standings : public Hands {
+ protected:
+  Standing standing() const { return standing_of(cell, job, request); }
+  void SetUp() override {
+    request.kind = CommandKind::at_position;
+    request.job = 1;
+    request.argument = 2;
+    request.X_RH = job.positions[1].X_RH;
+  }
+  Request request;
+};
+
+TEST_F(Standings, WhereItWasTaught) {
+  EXPECT_EQ(standing().code, Code::ok) << standing().reason;
+  EXPECT_EQ(standing().position, 1u);
+  request.X_RH.translation().x() += 0.9;
+  EXPECT_EQ(standing().code, Code::ok);
+}
+
+TEST_F(Standings, ElsewhereIsRefusedWithTheNumbers) {
+  request.X_RH.translation().x() += 1.1;
+  EXPECT_EQ(standing().code, Code::wrong_position);
+  EXPECT_THAT(standing().reason, HasSubstr("the hand is 1.100 mm and 0.000 deg away from front right"));
+  request.X_RH =
+      moved(job.positions[1].X_RH, (Vector6() << 0, 0, 0, 0.6 / degrees_per_radian, 0, 0).finished());
+  EXPECT_EQ(standing().code, Code::wrong_position);
+  request.X_RH = job.positions[2].X_RH;
+  EXPECT_EQ(standing().code, Code::wrong_position);
+}
+
+TEST_F(Standings, OtherJobsIndicesAndCells) {
+  request.job = 2;
+  EXPECT_EQ(standing().code, Code::unknown_job);
+  request.job = 1;
+  for (const std::int32_t index : {0, -1, 5}) {
+    request.argument = index;
+    EXPECT_EQ(standing().code, Code::argument_out_of_range);
+  }
+  const Cell fixed = load_cell(ZEROPOSE_SOURCE_DIR "/config/cells/car-body.json");
+  EXPECT_EQ(standing_of(fixed, fixed.jobs.front(), request).code, Code::no_procedure);
+}
+
+}  // namespace
+}  // namespace zeropose
