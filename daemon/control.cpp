@@ -9,6 +9,7 @@
 
 #include "daemon/cycle.h"
 #include "daemon/overlay.h"
+#include "daemon/survey_json.h"
 
 namespace zeropose {
 namespace {
@@ -216,8 +217,13 @@ Json answer_question(Cycle& cycle, const Json& question) {
   if (cmd == "zero") return zero_answer(cycle);
   if (cmd == "snapshot")
     return snapshot_answer(cycle, question.at("camera").get<std::string>(), question.value("marks", true));
+  if (cmd == "survey-start")
+    return cycle.start_survey(survey_options(cycle.cell(), question)), Json{{"status", "ok"}};
+  if (cmd == "survey") return survey_json(cycle.survey_now());
+  if (cmd == "survey-end") return cycle.end_survey(), Json{{"status", "ok"}};
   return {{"status", "error"},
-          {"reason", "unknown cmd \"" + cmd + "\"; known: status, measure, zero, snapshot"}};
+          {"reason", "unknown cmd \"" + cmd +
+                         "\"; known: status, measure, zero, snapshot, survey-start, survey, survey-end"}};
 }
 
 }  // namespace

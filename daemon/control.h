@@ -8,8 +8,8 @@ namespace zeropose {
 
 class Cycle;
 
-// One JSON object in, one out: {"cmd": "status" | "measure" | "zero" | "snapshot", ...}. Never throws: an
-// error is an answer {"status": "error", "reason": ...}.
+// One JSON object in, one out: {"cmd": "status" | "measure" | "zero" | "snapshot" | "survey-start" | "survey"
+// | "survey-end", ...}. Never throws: an error is an answer {"status": "error", "reason": ...}.
 std::string answer_control(Cycle& cycle, const std::string& line);
 
 // Where daemon and command line meet when nothing else is said: control.sock in $RUNTIME_DIRECTORY (systemd),

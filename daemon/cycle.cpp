@@ -3,7 +3,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <future>
 #include <numeric>
 
 namespace zeropose {
@@ -64,19 +63,6 @@ void Cycle::enqueue(const Request& request) {
     robot_tasks_.push_back([this, request] { carry_out(request); });
   }
   wake_.notify_all();
-}
-
-template <typename Result>
-Result Cycle::run_between(std::function<Result()> work) {
-  auto task = std::make_shared<std::packaged_task<Result()>>(std::move(work));
-  std::future<Result> result = task->get_future();
-  {
-    const std::lock_guard lock(mutex_);
-    if (stopping_) throw std::runtime_error("the daemon is stopping");
-    other_tasks_.push_back([task] { (*task)(); });
-  }
-  wake_.notify_all();
-  return result.get();
 }
 
 std::optional<Cycle::Task> Cycle::next_task() {
@@ -240,7 +226,7 @@ Report Cycle::report_for(const Request& request) {
       return report;
     }
     case CommandKind::at_position:
-      report.code = look_from_hand(request);
+      report.code = at_position(request);
       return report;
     default:
       report.code = Code::unknown_command;
@@ -254,24 +240,6 @@ void Cycle::select(std::size_t job) {
   X_O0O_last_.reset();
   hands_.forget();
   forget_checks();
-}
-
-Code Cycle::look_from_hand(const Request& request) {
-  const Job& job = cell_.jobs[selected_];
-  Standing standing = standing_of(cell_, job, request);
-  if (standing.code == Code::ok) {
-    const std::size_t camera[] = {job.positions[standing.position].camera};
-    FrameSet grabbed = grabber_.grab_live(camera, request.deadline - compute_reserve);
-    standing.code = grabbed.code;
-    standing.reason = std::move(grabbed.reason);
-    if (grabbed.code == Code::ok)
-      hands_.take(standing.position, request.part, request.X_RH, grabbed.frames.front(),
-                  static_cast<std::size_t>(cell_.zero_frames));
-  }
-  spdlog::info("{} request {}: position {} of part {}: code {}{}", cell_.robots.at(request.robot).name,
-               request.id, request.argument, request.part, static_cast<int>(standing.code),
-               standing.reason.empty() ? "" : " (" + standing.reason + ")");
-  return standing.code;
 }
 
 MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadline,

@@ -6,6 +6,7 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -17,6 +18,7 @@
 #include "daemon/grab.h"
 #include "daemon/overlay.h"
 #include "daemon/pictures.h"
+#include "daemon/survey.h"
 #include "measure/measurement.h"
 #include "protocol/robot_link.h"
 
@@ -44,6 +46,11 @@ struct ZeroOutcome {
 struct Snapshot {
   GrabResult grabbed;
   std::vector<MarkOverlay> marks;
+};
+
+struct SurveyState {
+  std::optional<Survey> survey;  // none runs
+  std::string last_problem;      // of the last position that was told; empty: it was taken
 };
 
 struct CameraStatus {
@@ -90,6 +97,12 @@ class Cycle {
   ZeroOutcome zero_now();
   Snapshot snapshot_now(std::size_t camera);
 
+  // While a survey runs AtPosition belongs to it. A new one takes the place of the old one.
+  void start_survey(const SurveyOptions& options);
+  // What it has gathered, and the last position that was not taken.
+  SurveyState survey_now();
+  void end_survey();
+
   Status status() const;
   const Cell& cell() const { return cell_; }
   // When the cycle thread last came round; the watchdog is fed from it.
@@ -97,6 +110,11 @@ class Cycle {
 
  private:
   using Task = std::function<void()>;
+  // What became of a position that a robot told.
+  struct Told {
+    Code code = Code::internal;
+    std::string reason;
+  };
 
   void run();
   std::optional<Task> next_task();
@@ -107,8 +125,10 @@ class Cycle {
   void carry_out(const Request& request);
   Report report_for(const Request& request);
   void select(std::size_t job);
-  // AtPosition: a picture of the camera on the hand, for the next measurement or zero of that part.
-  Code look_from_hand(const Request& request);
+  // A picture of the camera on the hand, for the next measurement or zero of that part; a survey's otherwise.
+  Code at_position(const Request& request);
+  Told look_from_hand(const Request& request);
+  Told look_for_survey(const Request& request);
   // part: whose pictures from hands count; none: of whichever was looked at last.
   MeasureOutcome measure(std::optional<std::uint32_t> part, TimePoint deadline,
                          const std::function<void()>& on_exposed);
@@ -135,6 +155,7 @@ class Cycle {
   std::vector<CameraCheck> checks_;   // by camera, when its references were last looked at
   std::vector<CameraHealth> health_;  // by camera
   HandPictures hands_;                // of the selected job
+  SurveyState survey_;
 
   mutable std::mutex mutex_;
   std::condition_variable wake_;
@@ -145,5 +166,18 @@ class Cycle {
   std::atomic<TimePoint> last_progress_{};
   std::thread thread_;
 };
+
+template <typename Result>
+Result Cycle::run_between(std::function<Result()> work) {
+  auto task = std::make_shared<std::packaged_task<Result()>>(std::move(work));
+  std::future<Result> result = task->get_future();
+  {
+    const std::lock_guard lock(mutex_);
+    if (stopping_) throw std::runtime_error("the daemon is stopping");
+    other_tasks_.push_back([task] { (*task)(); });
+  }
+  wake_.notify_all();
+  return result.get();
+}
 
 }  // namespace zeropose

@@ -22,6 +22,7 @@ enum class Code : std::uint16_t {
   no_procedure = 107,
   wrong_position = 108,
   position_missing = 109,
+  not_standing_still = 110,
 
   camera_missing = 201,
   frame_timeout = 202,

@@ -1,0 +1,184 @@
+#include <chrono>
+#include <fstream>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <thread>
+
+#include "config/config_error.h"
+#include "config/text.h"
+#include "daemon/cli/answer.h"
+#include "daemon/cli/calibrate.h"
+#include "daemon/control.h"
+#include "protocol/line_socket.h"
+
+namespace zeropose {
+namespace {
+
+using namespace cli;
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr const char* help =
+    R"(Gathers, with the running daemon, what the calibrations with a robot are made from. While it waits, the robot's
+program goes through its positions and tells each by AtPosition (index from 1, pose of the hand; docs/modbus.md). At
+each one the camera takes two pictures and looks for the target; the robot is answered "done", or why the position
+does not count (the target is out of sight, hidden, twice there, or still moving), and may tell it again. No position
+is lost: what was gathered when the time is up is written too.
+  --target ball      one ball anywhere in the picture: ball grids. Then: zeropose calibrate ball
+  --target circles, asymmetric-circles, chessboard
+                     a board of --rows --cols --pitch-mm: hand-eye. Then: zeropose calibrate hand-eye. It must look
+                     different from every side: asymmetric circles with an odd number of rows
+Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards also x_mm y_mm z_mm).
+Example:
+  zeropose calibrate survey --camera camera1 --positions 27 --target ball --min-diameter-px 20 --max-diameter-px 80 \
+      --robot robot.csv --points ball.csv
+Exit status: 0 all positions, 1 the time was up before (the files hold what there is), 2 no daemon or wrong usage.)";
+
+struct Options {
+  std::string socket = default_control_socket().string();
+  std::string camera, target = "ball", robot, points;
+  int positions = 0, rows = 0, cols = 0;
+  double min_diameter_px = 0, max_diameter_px = 0, pitch_mm = 0, patience_s = 600;
+  bool bright = false, json = false;
+};
+
+Json ask_daemon(const Options& options, const Json& question) {
+  Json answer = Json::parse(ask(options.socket, question.dump(), 30s));
+  if (answer.value("status", "") != "ok") throw ConfigError({answer.value("reason", answer.dump())});
+  return answer;
+}
+
+Json target_of(const Options& options) {
+  if (options.target == "ball")
+    return {{"kind", "ball"},
+            {"bright", options.bright},
+            {"min_diameter_px", options.min_diameter_px},
+            {"max_diameter_px", options.max_diameter_px}};
+  return {{"kind", options.target},
+          {"rows", options.rows},
+          {"cols", options.cols},
+          {"pitch_mm", options.pitch_mm}};
+}
+
+// What is new goes to stderr, so that whoever stands at the robot sees it.
+void tell_progress(const Json& now, std::size_t& told, std::string& problem) {
+  if (now["views"].size() != told) {
+    told = now["views"].size();
+    std::cerr << "position " << told << " of " << now["positions"] << '\n';
+  }
+  const std::string fresh = now["last_problem"].get<std::string>();
+  if (fresh != problem && !fresh.empty()) std::cerr << "not taken: " << fresh << '\n';
+  problem = fresh;
+}
+
+Json gathered(const Options& options) {
+  const auto deadline = Clock::now() + std::chrono::duration<double>(options.patience_s);
+  std::size_t told = 0;
+  std::string problem;
+  for (;;) {
+    const Json now = ask_daemon(options, {{"cmd", "survey"}});
+    if (now["positions"] != options.positions)
+      throw ConfigError({"another survey took the place of this one"});
+    tell_progress(now, told, problem);
+    if (now["missing"].empty() || Clock::now() >= deadline) return now;
+    std::this_thread::sleep_for(200ms);
+  }
+}
+
+std::string robot_table(const Json& views) {
+  std::ostringstream text;
+  text << "view,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n" << std::setprecision(12);
+  for (const Json& view : views) {
+    text << view["position"];
+    for (const Json& number : view["X_RH"]) text << ',' << number.get<double>();
+    text << '\n';
+  }
+  return text.str();
+}
+
+std::string points_table(const Json& views, bool ball) {
+  std::vector<std::string> columns{"u_px", "v_px", "suu", "svv", "suv"};
+  if (!ball) columns.insert(columns.begin(), {"x_mm", "y_mm", "z_mm"});
+  std::ostringstream text;
+  text << "view" << std::setprecision(10);
+  for (const std::string& column : columns) text << ',' << column;
+  text << '\n';
+  for (const Json& view : views)
+    for (const Json& point : view["points"]) {
+      text << view["position"];
+      for (const std::string& column : columns) text << ',' << point[column].get<double>();
+      text << '\n';
+    }
+  return text.str();
+}
+
+void write(const std::string& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  file << text;
+  file.close();
+  if (!file) throw ConfigError({concat({path, ": cannot be written"})});
+}
+
+Answer survey(const Options& options) {
+  ask_daemon(options, {{"cmd", "survey-start"},
+                       {"camera", options.camera},
+                       {"positions", options.positions},
+                       {"target", target_of(options)}});
+  std::cerr << "waiting for the robot to tell " << options.positions << " positions\n";
+  const Json all = gathered(options);
+  write(options.robot, robot_table(all["views"]));
+  write(options.points, points_table(all["views"], options.target == "ball"));
+  ask_daemon(options, {{"cmd", "survey-end"}});
+  std::string missing;
+  for (const Json& position : all["missing"])
+    missing += concat({missing.empty() ? "" : ", ", position.dump()});
+  Answer answer;
+  answer.json = {
+      {"status", missing.empty() ? "ok" : "failed"},
+      {"reason", missing.empty() ? "" : "the time was up before the robot told position " + missing},
+      {"positions", all["positions"]},
+      {"missing", all["missing"]},
+      {"last_problem", all["last_problem"]},
+      {"robot", options.robot},
+      {"points", options.points}};
+  answer.exit_status = missing.empty() ? done : no_answer;
+  answer.text = concat({std::to_string(all["views"].size()), " positions are in ", options.robot, " and ",
+                        options.points, missing.empty() ? "" : "; missing are " + missing, "\n"});
+  return answer;
+}
+
+}  // namespace
+
+void add_calibrate_survey(CLI::App& calibrate, int& exit_status) {
+  auto options = std::make_shared<Options>();
+  CLI::App* verb =
+      calibrate.add_subcommand("survey", "Gathers what a camera sees at positions that a robot tells");
+  verb->add_option("--socket", options->socket, "the daemon's Unix socket")->capture_default_str();
+  verb->add_option("--camera", options->camera, "name of the camera in the cell")->required();
+  verb->add_option("--positions", options->positions, "how many positions the robot goes through")
+      ->required()
+      ->check(CLI::Range(1, 1000));
+  verb->add_option("--target", options->target, "what is looked for")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"ball", "circles", "asymmetric-circles", "chessboard"}));
+  verb->add_flag("--bright", options->bright, "the ball is brighter than what surrounds it");
+  verb->add_option("--min-diameter-px", options->min_diameter_px, "of the ball's image");
+  verb->add_option("--max-diameter-px", options->max_diameter_px, "of the ball's image");
+  verb->add_option("--rows", options->rows, "of a board");
+  verb->add_option("--cols", options->cols, "of a board");
+  verb->add_option("--pitch-mm", options->pitch_mm, "of a board");
+  verb->add_option("--robot", options->robot, "the CSV of the hand's poses to write")->required();
+  verb->add_option("--points", options->points, "the CSV of the pixels to write")->required();
+  verb->add_option("--patience", options->patience_s, "seconds to wait for all positions")
+      ->capture_default_str();
+  verb->add_flag(
+      "--json", options->json,
+      "one JSON object on stdout: status, reason, positions, missing, last_problem, robot, points");
+  verb->footer(help);
+  verb->callback(
+      [options, &exit_status] { exit_status = run([&] { return survey(*options); }, options->json); });
+}
+
+}  // namespace zeropose

@@ -1,0 +1,103 @@
+#include "daemon/survey.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <stdexcept>
+
+namespace zeropose {
+namespace {
+
+constexpr int most_positions = 1000;
+// Of the target between the two pictures: what a standing robot and the noise leave at most.
+constexpr double still_px = 0.15, still_sigmas = 5;
+
+struct Seen {
+  std::vector<SurveyPoint> points;
+  std::string reason;  // why there are none
+};
+
+Seen seen(const BallTarget& target, const ImageView& image) {
+  MarkSearch search = target.search;
+  search.expected_px = {(image.width_px - 1) / 2.0, (image.height_px - 1) / 2.0};
+  search.half_window_px = {image.width_px / 2.0, image.height_px / 2.0};
+  const AllMarks all = find_all_marks(image, search);
+  if (all.found.empty()) return {{}, "no ball is in sight: " + reason_text(all.nearest, search)};
+  if (all.found.size() > 1)
+    return {
+        {},
+        fmt::format(
+            "{} things in the picture pass for the ball, at {:.0f} {:.0f} and {:.0f} {:.0f} px: cover the "
+            "others, or narrow the limits of its diameter",
+            all.found.size(), all.found[0].u_px.x(), all.found[0].u_px.y(), all.found[1].u_px.x(),
+            all.found[1].u_px.y())};
+  return {{{Eigen::Vector3d::Zero(), all.found[0].u_px, all.found[0].covariance_px2}}, {}};
+}
+
+Seen seen(const BoardTarget& target, const ImageView& image) {
+  const BoardResult board = find_board(image, target.problem);
+  if (board.status != BoardStatus::found) return {{}, "the board is not found: " + board.reason};
+  if (board.equivalent_readings > 1)
+    return {
+        {},
+        fmt::format(
+            "the board looks the same from {} sides, so that its frame turns from picture to picture: take "
+            "an asymmetric one with an odd number of rows",
+            board.equivalent_readings)};
+  Seen seen;
+  for (const BoardPoint& point : board.points)
+    seen.points.push_back({point.p_B_mm, point.u_px, point.covariance_px2});
+  return seen;
+}
+
+// How far the target wandered, by the points that both pictures show.
+std::string movement(const Seen& first, const Seen& second) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  double variance = 0;
+  int count = 0;
+  for (const SurveyPoint& a : first.points)
+    for (const SurveyPoint& b : second.points) {
+      if (a.p_B_mm != b.p_B_mm) continue;
+      sum += b.u_px - a.u_px;
+      variance += a.covariance_px2.trace() + b.covariance_px2.trace();
+      ++count;
+    }
+  if (count == 0) return "the two pictures show nothing in common";
+  const double mean_px = sum.norm() / count, sigma_px = std::sqrt(variance) / count;
+  if (mean_px <= still_px + still_sigmas * sigma_px) return {};
+  return fmt::format("the target moved by {:.2f} px between two pictures: the robot did not stand still",
+                     mean_px);
+}
+
+}  // namespace
+
+Survey::Survey(const SurveyOptions& options) : options_(options) {
+  if (options.positions < 1 || options.positions > most_positions)
+    throw std::invalid_argument(
+        fmt::format("positions: found {}, expected 1 to {}", options.positions, most_positions));
+}
+
+SurveyVerdict Survey::look(int position, const Pose& X_RH, const ImageView& first, const ImageView& second) {
+  if (position < 1 || position > options_.positions)
+    return {Code::argument_out_of_range,
+            fmt::format("position {} is told, the survey has 1 to {}", position, options_.positions)};
+  const auto look_at = [&](const ImageView& image) {
+    return std::visit([&](const auto& target) { return seen(target, image); }, options_.target);
+  };
+  const Seen before = look_at(first), after = look_at(second);
+  for (const Seen* one : {&before, &after})
+    if (one->points.empty()) return {Code::too_few_marks, one->reason};
+  if (std::string moved = movement(before, after); !moved.empty())
+    return {Code::not_standing_still, std::move(moved)};
+  views_[position] = {X_RH, after.points};
+  return {Code::ok, {}};
+}
+
+std::vector<int> Survey::missing() const {
+  std::vector<int> missing;
+  for (int position = 1; position <= options_.positions; ++position)
+    if (!views_.contains(position)) missing.push_back(position);
+  return missing;
+}
+
+}  // namespace zeropose

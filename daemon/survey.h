@@ -1,0 +1,72 @@
+// A robot goes through a list of positions, says where its hand is, and at each one a camera looks for a
+// target: what the calibrations that need a robot are made from (spec 40: P2, hand-eye). It only gathers;
+// calibrating is done from what it gathered.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "calib/rigid.h"
+#include "measure/board.h"
+#include "measure/code.h"
+#include "measure/marks.h"
+
+namespace zeropose {
+
+// One ball anywhere in the picture; the search's window is not used.
+struct BallTarget {
+  MarkSearch search;
+};
+
+// A board with one reading only: its frame must be the same in every picture.
+struct BoardTarget {
+  BoardProblem problem;
+};
+
+struct SurveyOptions {
+  std::size_t camera = 0;  // of the cell
+  std::variant<BallTarget, BoardTarget> target;
+  int positions = 0;  // the robot counts them from 1
+};
+
+struct SurveyPoint {
+  Eigen::Vector3d p_B_mm = Eigen::Vector3d::Zero();  // in the target's frame; of a ball zero
+  Eigen::Vector2d u_px = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
+};
+
+struct SurveyView {
+  Pose X_RH = Pose::Identity();
+  std::vector<SurveyPoint> points;
+};
+
+// Why a position was not taken; nothing is changed then.
+struct SurveyVerdict {
+  Code code = Code::internal;
+  std::string reason;  // one sentence with the numbers, empty when ok
+};
+
+class Survey {
+ public:
+  // Throws std::invalid_argument for options that make no sense.
+  explicit Survey(const SurveyOptions& options);
+
+  const SurveyOptions& options() const { return options_; }
+
+  // Two pictures of one position, taken one after the other, so that a robot that still moves shows. A
+  // position that is told again takes the place of what was there. Codes: argument_out_of_range,
+  // too_few_marks (the target is not in sight, or more than one), not_standing_still.
+  SurveyVerdict look(int position, const Pose& X_RH, const ImageView& first, const ImageView& second);
+
+  const std::map<int, SurveyView>& views() const { return views_; }
+  std::vector<int> missing() const;
+
+ private:
+  SurveyOptions options_;
+  std::map<int, SurveyView> views_;
+};
+
+}  // namespace zeropose

@@ -1,0 +1,21 @@
+// Surveys on the control socket.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "config/cell.h"
+#include "daemon/cycle.h"
+
+namespace zeropose {
+
+// {"camera": NAME, "positions": N, "target": {"kind": "ball", "bright", "min_diameter_px", "max_diameter_px"}
+// or
+// {"kind": "circles" | "asymmetric-circles" | "chessboard", "rows", "cols", "pitch_mm"}}. Throws
+// std::invalid_argument or what JSON throws for a wrong question.
+SurveyOptions survey_options(const Cell& cell, const nlohmann::json& question);
+
+// {"positions", "missing": [..], "last_problem", "views": [{"position", "X_RH": [x, y, z, rx, ry, rz],
+// "points": [{x_mm, y_mm, z_mm, u_px, v_px, suu, svv, suv}]}]}; positions 0: none runs.
+nlohmann::json survey_json(const SurveyState& state);
+
+}  // namespace zeropose
