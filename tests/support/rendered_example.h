@@ -6,15 +6,17 @@
 #include <string>
 
 #include "config/cell.h"
+#include "tests/support/poses.h"
 #include "tests/support/rendered_pictures.h"
 
 namespace zeropose::test {
 
 class RenderedExample {
  public:
-  explicit RenderedExample(const std::string& name)
+  // drawing_sigma_mm: how far each coordinate of a mark's true place is off the job's.
+  explicit RenderedExample(const std::string& name, double drawing_sigma_mm = 0)
       : cell_(load_cell(file(name, ".json"))),
-        scene_(load_scene(cell_, file(name, ".sim.json"))),
+        scene_(off_the_drawing(load_scene(cell_, file(name, ".sim.json")), drawing_sigma_mm)),
         renderer_(scene_) {}
 
   const Job& job() const { return cell_.jobs.front(); }
@@ -49,6 +51,13 @@ class RenderedExample {
  private:
   static std::string file(const std::string& name, const char* ending) {
     return std::string(ZEROPOSE_SOURCE_DIR) + "/config/cells/" + name + ending;
+  }
+
+  static Scene off_the_drawing(Scene scene, double sigma_mm) {
+    Random random(1);
+    for (Mark& mark : scene.marks)
+      for (double& coordinate : mark.p_O_mm) coordinate += normal(random, sigma_mm);
+    return scene;
   }
 
   Cell cell_;
