@@ -210,7 +210,8 @@ TEST_F(GunCheck, BudgetOfThePublishedPositions) {
   rms({"all of that, marks 0.1 px", 0.1, practice, drawing_mm});
   rms({"all of that, balls 0.01 mm off", 0.02, practice, 0.01});
   EXPECT_TRUE((all.array() <= published_largest.array() / 2).all()) << all.transpose();
-  EXPECT_GT(drawing(0), 2 * std::max(marks(0), calibration(0)));  // what is worth improving
+  // What is worth improving: the balls' coordinates across the line of sight, the calibration along it.
+  EXPECT_GT(drawing(0), 1.3 * std::max(marks(0), calibration(0)));
   EXPECT_GT(calibration(2), 2 * drawing(2));
 }
 

@@ -107,7 +107,7 @@ TEST(SimFile, SaysWhatTheObjectLooksLike) {
   EXPECT_EQ(sheet.outline_mm[1], Eigen::Vector2d(2100, -950));
   const auto plate = std::get<BallPlateObject>(test::example("gun-check").object);
   EXPECT_EQ(plate.middle_O_mm, Eigen::Vector3d(12, 9, -4));
-  EXPECT_EQ(plate.size_mm, Eigen::Vector2d(60, 56));
+  EXPECT_EQ(plate.size_mm, Eigen::Vector2d(70, 64));
 }
 
 // The car body's truth with an object of its own.
