@@ -14,7 +14,7 @@ using Eigen::Matrix2d;
 using Eigen::Vector2d;
 
 constexpr int samples_per_px = 4;
-constexpr int tile_px = 32;
+constexpr int tile_px = 16;
 
 // Where a point of the image lies against the outline, seen as straight there.
 struct EdgePoint {
@@ -61,6 +61,12 @@ double share_inside(const EdgePoint& edge) {
   return inside > 0 ? 1 - corner : corner;
 }
 
+// The larger singular value.
+double largest_stretch(const Matrix2d& M) {
+  const double sum = M.squaredNorm() / 2, determinant = M.determinant();
+  return std::sqrt(sum + std::sqrt(std::max(0.0, sum * sum - determinant * determinant)));
+}
+
 // An outline as the camera sees it in one tile, where the plane's scale hardly changes.
 class OutlineInTile {
  public:
@@ -73,27 +79,36 @@ class OutlineInTile {
     if (!px_per_mm) return;  // nothing of the plane is here
     const Matrix2d mm_per_px = px_per_mm->inverse();
     mm_per_px_transposed_ = mm_per_px.transpose();
-    constexpr double perspective = 1.3;  // the far end of the tile has more mm per px
+    constexpr double perspective = 1.1;  // the far end of the tile has more mm per px
+    mm_per_sample_ = perspective * largest_stretch(mm_per_px) / samples_per_px;
     const double distance = outline.edge_at(*q).distance_mm;
-    const double reach_mm = perspective * mm_per_px.norm() * tile.reach_px();
+    const double reach_mm = mm_per_sample_ * samples_per_px * tile.reach_px();
     lies_ = distance > reach_mm ? Lies::outside : distance < -reach_mm ? Lies::inside : Lies::across;
   }
 
   Lies lies() const { return lies_; }
 
-  double share_at(const Vector2d& u_px) const {
+  // Of a sample, and for how many more on each side it stays the same at least.
+  struct Share {
+    double share = 0;
+    int steps = 0;
+  };
+  Share share_at(const Vector2d& u_px) const {
     const auto q = plane_.meet(u_px);
-    if (!q) return 0;
+    if (!q) return {};
     const FlatOutline::Edge edge = outline_.edge_at(*q);
     const Vector2d gradient = mm_per_px_transposed_ * edge.normal;
     const double slope = gradient.norm();
-    return share_inside({edge.distance_mm / slope, gradient / slope});
+    const double steps = std::abs(edge.distance_mm) / mm_per_sample_ - 1;  // less the sample's own size
+    return {share_inside({edge.distance_mm / slope, gradient / slope}),
+            static_cast<int>(std::clamp(steps, 0.0, 1e4))};
   }
 
  private:
   const PlaneView& plane_;
   const FlatOutline& outline_;
   Matrix2d mm_per_px_transposed_ = Matrix2d::Identity();
+  double mm_per_sample_ = 0;  // at most
   Lies lies_ = Lies::outside;
 };
 
@@ -103,8 +118,12 @@ std::vector<double> blurred_rows(const Tile& tile, const OutlineInTile& outline,
   std::vector<double> rows, samples(static_cast<std::size_t>(tile.columns()));
   rows.reserve(static_cast<std::size_t>(tile.rows() * tile.width));
   for (int row = 0; row < tile.rows(); ++row) {
-    for (int column = 0; column < tile.columns(); ++column)
-      samples[static_cast<std::size_t>(column)] = outline.share_at({tile.u(column), tile.v(row)});
+    for (int column = 0; column < tile.columns();) {
+      const auto [share, steps] = outline.share_at({tile.u(column), tile.v(row)});
+      const int next = std::min(column + 1 + steps, tile.columns());
+      std::fill(samples.begin() + column, samples.begin() + next, share);
+      column = next;
+    }
     for (int pixel = 0; pixel < tile.width; ++pixel) {
       const double* first = samples.data() + pixel * samples_per_px;
       double sum = 0;
@@ -138,28 +157,36 @@ FlatOutline::Edge DiscOutline::edge_at(const Vector2d& q_mm) const {
   return {r - radius_mm_, q_mm / r};
 }
 
-PolygonOutline::PolygonOutline(std::vector<Vector2d> vertices_mm, std::vector<RoundHole> holes)
-    : vertices_mm_(std::move(vertices_mm)), holes_(std::move(holes)) {}
+PolygonOutline::PolygonOutline(const std::vector<Vector2d>& vertices_mm, std::vector<RoundHole> holes)
+    : holes_(std::move(holes)) {
+  for (std::size_t i = 0; i < vertices_mm.size(); ++i) {
+    const Vector2d along = vertices_mm[(i + 1) % vertices_mm.size()] - vertices_mm[i];
+    sides_.push_back({vertices_mm[i], along.normalized(), along.norm()});
+  }
+}
 
 // Inside are the points from which a line crosses the outline an odd number of times.
 FlatOutline::Edge PolygonOutline::polygon_edge_at(const Vector2d& q_mm) const {
   double least = std::numeric_limits<double>::infinity();
-  Vector2d away = Vector2d::UnitX(), across = Vector2d::UnitX();
+  Vector2d away = Vector2d::UnitX(), along = Vector2d::UnitX();
   bool inside = false;
-  for (std::size_t i = 0; i < vertices_mm_.size(); ++i) {
-    const Vector2d &a = vertices_mm_[i], &b = vertices_mm_[(i + 1) % vertices_mm_.size()];
-    const Vector2d edge = b - a, to = q_mm - a;
-    const double along = std::clamp(to.dot(edge) / edge.squaredNorm(), 0.0, 1.0);
-    const Vector2d from_edge = to - along * edge;
-    if (from_edge.squaredNorm() < least) {
-      least = from_edge.squaredNorm();
-      away = from_edge;
-      across = Vector2d(edge.y(), -edge.x()).normalized();
+  for (const Side& side : sides_) {
+    const Vector2d to = q_mm - side.from_mm;
+    const double there = side.along.dot(to);
+    const Vector2d from_side = to - std::clamp(there, 0.0, side.length_mm) * side.along;
+    if (from_side.squaredNorm() < least) {
+      least = from_side.squaredNorm();
+      away = from_side;
+      along = side.along;
     }
-    if ((a.y() > q_mm.y()) != (b.y() > q_mm.y()) && to.x() < edge.x() * to.y() / edge.y()) inside = !inside;
+    const double rise = side.length_mm * side.along.y();
+    if ((to.y() < 0) == (to.y() < rise)) continue;
+    const double right = to.x() * side.along.y() - to.y() * side.along.x();  // of the side's line, upward
+    if ((right < 0) == (rise > 0)) inside = !inside;
   }
   const double distance = std::sqrt(least), sign = inside ? -1 : 1;
-  return {sign * distance, distance > 1e-9 ? Vector2d(sign / distance * away) : across};
+  return {sign * distance,
+          distance > 1e-9 ? Vector2d(sign / distance * away) : Vector2d(along.y(), -along.x())};
 }
 
 FlatOutline::Edge PolygonOutline::edge_at(const Vector2d& q_mm) const {

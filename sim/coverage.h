@@ -36,16 +36,21 @@ struct RoundHole {
   double radius_mm = 0;
 };
 
-// A simple polygon with holes that neither touch it nor each other.
+// A simple polygon, its vertices against the clock as seen from +z, with holes that neither touch it nor each
+// other.
 class PolygonOutline final : public FlatOutline {
  public:
-  PolygonOutline(std::vector<Eigen::Vector2d> vertices_mm, std::vector<RoundHole> holes);
+  PolygonOutline(const std::vector<Eigen::Vector2d>& vertices_mm, std::vector<RoundHole> holes);
   Edge edge_at(const Eigen::Vector2d& q_mm) const override;
 
  private:
+  struct Side {
+    Eigen::Vector2d from_mm, along;  // unit
+    double length_mm;
+  };
   Edge polygon_edge_at(const Eigen::Vector2d& q_mm) const;
 
-  std::vector<Eigen::Vector2d> vertices_mm_;
+  std::vector<Side> sides_;
   std::vector<RoundHole> holes_;
 };
 

@@ -47,7 +47,7 @@ Extent extent_of(const std::vector<Vector2d>& outline_mm) {
 
 // The steel with the lines that rolling left.
 std::vector<Thing> rolled_steel(const Extent& extent, double grey, Random& random) {
-  constexpr int lines = 40;
+  constexpr int lines = 24;
   const Vector2d beyond = extent.half() + Vector2d::Constant(100);  // for corners that are displaced
   std::vector<Thing> things{{rounded_box(extent.middle(), 0, beyond, 0),
                              {.grey = grey, .texture_grey = 2, .texture_mm = 5, .shading_grey = 5}}};
@@ -150,7 +150,7 @@ PolygonOutline SteelSheetLook::outline(const CameraModel& camera, const Moment& 
     else
       holes.push_back({place, feature.radius_mm});
   }
-  return {std::move(vertices), std::move(holes)};
+  return {vertices, std::move(holes)};
 }
 
 void SteelSheetLook::paint(Canvas& canvas, const Moment& moment) const {

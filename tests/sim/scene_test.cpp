@@ -100,6 +100,54 @@ TEST(SimFile, NamesEveryMistakeWithItsKeyPath) {
   EXPECT_THAT(mistakes, Contains(HasSubstr("cluter")));
 }
 
+TEST(SimFile, SaysWhatTheObjectLooksLike) {
+  EXPECT_TRUE(std::holds_alternative<PlatesObject>(car_body().object));
+  const auto sheet = std::get<SheetObject>(test::example("press-shop").object);
+  ASSERT_EQ(sheet.outline_mm.size(), 4U);
+  EXPECT_EQ(sheet.outline_mm[1], Eigen::Vector2d(2100, -950));
+  const auto plate = std::get<BallPlateObject>(test::example("gun-check").object);
+  EXPECT_EQ(plate.middle_O_mm, Eigen::Vector3d(12, 9, -4));
+  EXPECT_EQ(plate.size_mm, Eigen::Vector2d(70, 64));
+}
+
+// The car body's truth with an object of its own.
+std::vector<std::string> mistakes_of_object(const std::string& object) {
+  return mistakes_of(with(car_body_text(), "\"picture\":", "\"object\": " + object + ", \"picture\":"));
+}
+
+TEST(SimFile, NamesWhatIsWrongWithTheObject) {
+  EXPECT_THAT(mistakes_of_object("{ \"kind\": \"plates\" }"), testing::IsEmpty());
+  EXPECT_THAT(mistakes_of_object("{ \"kind\": \"bal_plate\" }"),
+              Contains(AllOf(HasSubstr("object.kind"), HasSubstr("ball_plate"))));
+  EXPECT_THAT(mistakes_of_object("{ \"kind\": \"sheet\" }"), Contains(HasSubstr("object.outline_mm")));
+  EXPECT_THAT(mistakes_of_object(R"({ "kind": "sheet", "outline_mm": [[0, 0, 0], [1, 0, 0]] })"),
+              Contains(AllOf(HasSubstr("object.outline_mm"), HasSubstr("2 corners"))));
+  EXPECT_THAT(mistakes_of_object(R"({ "kind": "sheet", "outline_mm": [[0, 0, 0], [1, 0, 0], [1, 1, 2]] })"),
+              Contains(AllOf(HasSubstr("object.outline_mm"), HasSubstr("in space"))));
+  EXPECT_THAT(mistakes_of_object(R"({ "kind": "ball_plate", "middle_mm": [0, 0, 0], "size_mm": [0, 5] })"),
+              Contains(HasSubstr("object.size_mm")));
+  EXPECT_THAT(mistakes_of_object(R"({ "kind": "plates", "size_mm": [5, 5] })"),
+              Contains(HasSubstr("object.size_mm")));
+}
+
+TEST(SimFile, SaysHowPartsCome) {
+  const auto drive = [](const char* cell) { return load_sim_file(cells + cell + ".sim.json").drive.value(); };
+  EXPECT_EQ(drive("car-body").shift, Vector6(30, 30, 30, 0.2, 0.2, 0.2));
+  EXPECT_EQ(drive("car-body").max_error, Vector6(0.4, 0.4, 0.4, 0.012, 0.012, 0.012));
+  EXPECT_EQ(drive("car-body").beyond_every, 0);
+  EXPECT_EQ(drive("press-shop").max_error_at_points_mm, 2);
+  EXPECT_EQ(drive("gun-check").poses.size(), 14U);
+  EXPECT_NEAR(drive("gun-check").poses[1].translation().z(), 0.06 * -33.7, 1e-9);
+}
+
+TEST(SimFile, NamesWhatIsWrongWithTheDrive) {
+  const std::string text = car_body_text();
+  EXPECT_THAT(mistakes_of(with(text, "\"shift\": [30", "\"shift\": [-30")),
+              Contains(HasSubstr("drive.shift")));
+  EXPECT_THAT(mistakes_of(with(text, "\"max_error\"", "\"max_eror\"")),
+              Contains(AllOf(HasSubstr("drive.max_eror"), HasSubstr("\"max_error\""))));
+}
+
 TEST(SimFile, MissingFileIsAConfigError) {
   EXPECT_THROW(load_sim_file(cells + "no-such-cell.sim.json"), ConfigError);
 }

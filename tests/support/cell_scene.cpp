@@ -4,7 +4,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "calib/eccentricity.h"
+#include "measure/mark_image.h"
 
 namespace zeropose::test {
 namespace {
@@ -101,8 +101,10 @@ std::vector<Observation> observe(std::span<const CalibratedCamera> cameras, cons
     const auto u = project(camera.model, X_CO * mark.p_O_mm);
     const Eigen::Vector2d noise(normal(random, sigma_px), normal(random, sigma_px));
     if (!u) continue;
-    const Eigen::Vector2d offset = ellipse_centre_offset(camera.model, X_CO * mark.p_O_mm,
-                                                         X_CO.linear() * mark.normal_O, mark.radius_mm);
+    const Eigen::Vector2d offset =
+        has_image_offset(mark)
+            ? image_offset(camera.model, mark, X_CO * mark.p_O_mm, X_CO.linear() * mark.normal_O, 1)
+            : Eigen::Vector2d(0, 0);
     const double variance = sigma_px > 0 ? sigma_px * sigma_px : 1e-4;
     observations.push_back(
         {view.camera, view.mark, *u + offset + noise, variance * Eigen::Matrix2d::Identity()});
