@@ -83,6 +83,12 @@ TangentDisc tangent_disc(const Vector3d& p_C_mm, double radius_mm) {
   return disc;
 }
 
+void paint_ball(Canvas& canvas, const Vector3d& p_C_mm, double radius_mm, double grey) {
+  if (!(p_C_mm.z() > radius_mm)) return;  // behind the camera
+  const TangentDisc seen = tangent_disc(p_C_mm, radius_mm);
+  canvas.fill(DiscOutline(seen.radius_mm), seen.X_CM, grey);
+}
+
 BallPlateLook::BallPlateLook(const BallPlateObject& plate, const Scene& scene, std::size_t camera) {
   const PictureSettings& picture = scene.picture;
   Random looks(picture.seed * 1000 + camera), dirt(picture.seed * 1000 + 500 + camera);
@@ -105,9 +111,7 @@ void BallPlateLook::paint_ball(Canvas& canvas, const Ball& ball, const Moment& m
   Pose X_OM = Pose::Identity();
   X_OM.translation() = ball.p_O_mm;
   const Pose X_CM = moment.placed(ball.name, canvas.camera(), moment.X_CO * X_OM);
-  if (!(X_CM.translation().z() > ball.radius_mm)) return;  // behind the camera
-  const TangentDisc seen = tangent_disc(X_CM.translation(), ball.radius_mm);
-  canvas.fill(DiscOutline(seen.radius_mm), seen.X_CM, ball.grey);
+  zeropose::paint_ball(canvas, X_CM.translation(), ball.radius_mm, ball.grey);
   if (moment.covered(ball.name)) canvas.paint({Pose::Identity(), ball.cover}, X_CM);
 }
 

@@ -13,6 +13,9 @@ struct TangentDisc {
 };
 TangentDisc tangent_disc(const Eigen::Vector3d& p_C_mm, double radius_mm);
 
+// A ball of one grey, if it is before the camera.
+void paint_ball(Canvas& canvas, const Eigen::Vector3d& p_C_mm, double radius_mm, double grey);
+
 class BallPlateLook final : public Look {
  public:
   // Throws std::invalid_argument for marks that are no balls of known radius.

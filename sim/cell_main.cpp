@@ -19,7 +19,7 @@ namespace {
 
 struct Options {
   std::filesystem::path cell, control;
-  std::string shift;
+  std::string shift, survey;
   std::vector<std::string> faults;
   bool drives = false;
   std::optional<int> cars;
@@ -69,6 +69,13 @@ DriveOptions drive_options(const Options& options) {
   return drive;
 }
 
+SurveyDrive survey_of(const Options& options) {
+  const std::filesystem::path truth = sim_file_of(options.cell);
+  for (const SurveyDrive& survey : load_sim_file(truth).surveys)
+    if (survey.camera == options.survey) return survey;
+  throw std::invalid_argument(truth.string() + " has no survey for camera " + options.survey);
+}
+
 int run(const Options& options) {
   const StopSignals signals;
   const Cell cell = load_cell(options.cell);
@@ -82,6 +89,10 @@ int run(const Options& options) {
                     [&simulated](const std::string& line) { return answer_cell_control(simulated, line); });
   std::fprintf(stderr, "zeropose-cell: serving %zu cameras of cell %s\n", cell.cameras.size(),
                cell.name.c_str());
+  if (!options.survey.empty())
+    return drive_survey(
+        cell, survey_of(options), [&simulated](const CarriedBall& ball) { simulated.show_ball(ball); },
+        signals.stopped());
   if (options.drives)
     return drive(cell, X_WO_nominal,
                  {[&simulated](const Pose& X_WO) { simulated.show(X_WO); },
@@ -99,6 +110,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--fault", options.faults,
                  "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK,\n"
                  "camera-moved:CAMERA");
+  app.add_option("--survey", options.survey, "run the robot's program of the ball grid for this camera");
   app.add_option("--control", options.control, "Unix socket that moves the object and injects faults");
   auto* drives =
       app.add_flag("--drive", options.drives,

@@ -16,17 +16,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-SimulatedRobotOptions robot_options(const Cell& cell, const DriveOptions& drive) {
-  const RobotOptions& robot = cell.robots.front();
-  SimulatedRobotOptions options;
-  const auto& tcp = std::get<ModbusTcpOptions>(robot.link);
-  options.address = tcp.address;
-  options.port = tcp.port;
-  options.unit = tcp.robot.unit.unit;
-  options.convention = robot.convention;
-  options.frame = static_cast<std::uint16_t>(robot.frame);
-  options.first_request_id = std::random_device{}() | 1U;  // a robot that starts anew must not repeat its ids
-  options.patience = cell.deadline + 500ms;
+SimulatedRobotOptions driving_robot(const Cell& cell, const DriveOptions& drive) {
+  SimulatedRobotOptions options = robot_options(cell, 0);
   options.max_translation_mm = drive.robot_max_mm;
   options.max_rotation_deg = drive.robot_max_deg;
   return options;
@@ -222,55 +213,29 @@ class Tour {
       : cell_(cell),
         job_(cell.jobs.front()),
         driven_(driven),
-        errors_(options.robot),
         robot_(robot),
-        noise_(options.seed + 1000) {
-    std::mt19937_64 fixed(options.seed + 2000);
-    for (std::size_t i = 0; i < job_.positions.size(); ++i)
-      absolute_.push_back(delta(errors_.absolute_mm, errors_.absolute_deg, fixed));
-  }
+        errors_(options.robot, job_.positions.size(), options.seed + 1000) {}
 
   // The answer that ended it; ok when every position was taken.
   RobotAnswer go(std::uint32_t part) {
     RobotAnswer answer;
     answer.refusal.clear();
     for (std::size_t i = 0; i < job_.positions.size() && answer.ok(); ++i) {
-      const Pose& X_RH = job_.positions[i].X_RH;
-      const Vector6 off = absolute_[i] + delta(errors_.repeatability_mm, errors_.repeatability_deg, noise_);
-      driven_.move_hand(*cell_.hand_of[job_.positions[i].camera], moved(X_RH, off));
+      const HandPosition& position = job_.positions[i];
+      driven_.move_hand(*cell_.hand_of[position.camera], errors_.true_hand(i, position.X_RH));
       answer = robot_.at_position(static_cast<std::uint16_t>(job_.number), part,
-                                  static_cast<std::int32_t>(i + 1), X_RH);
+                                  static_cast<std::int32_t>(i + 1), position.X_RH);
     }
     return answer;
   }
 
  private:
-  static Vector6 delta(double mm, double deg, std::mt19937_64& generator) {
-    std::normal_distribution<double> normal;
-    Vector6 delta;
-    for (Eigen::Index i = 0; i < 6; ++i)
-      delta(i) = normal(generator) * (i < 3 ? mm : deg / degrees_per_radian);
-    return delta;
-  }
-
   const Cell& cell_;
   const Job& job_;
   const DrivenCell& driven_;
-  RobotErrors errors_;
   SimulatedRobot& robot_;
-  std::mt19937_64 noise_;
-  std::vector<Vector6> absolute_;
+  HandErrors errors_;
 };
-
-// Tries until it is done, the time is up, or it shall stop.
-bool done_within(double seconds, const std::atomic<bool>& stop, const std::function<bool()>& done) {
-  const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
-  while (!stop && Clock::now() < deadline) {
-    if (done()) return true;
-    std::this_thread::sleep_for(100ms);
-  }
-  return false;
-}
 
 // From the pictures of as many rounds as the cell averages over.
 RobotAnswer zero_from_hand(const Cell& cell, Tour& tour, SimulatedRobot& robot) {
@@ -287,9 +252,35 @@ bool is_ready(SimulatedRobot& robot) {
 
 }  // namespace
 
+SimulatedRobotOptions robot_options(const Cell& cell, std::size_t index) {
+  const RobotOptions& robot = cell.robots.at(index);
+  const auto* tcp = std::get_if<ModbusTcpOptions>(&robot.link);
+  if (tcp == nullptr)
+    throw std::invalid_argument("robot " + robot.name + " is not driven: its link is no Modbus TCP server");
+  SimulatedRobotOptions options;
+  options.address = tcp->address;
+  options.port = tcp->port;
+  options.unit = tcp->robot.unit.unit;
+  options.convention = robot.convention;
+  options.frame = static_cast<std::uint16_t>(robot.frame);
+  options.robot_index = static_cast<std::uint16_t>(index + 1);
+  options.first_request_id = std::random_device{}() | 1U;  // a robot that starts anew must not repeat its ids
+  options.patience = cell.deadline + 500ms;
+  return options;
+}
+
+bool done_within(double seconds, const std::atomic<bool>& stop, const std::function<bool()>& done) {
+  const auto deadline = Clock::now() + std::chrono::duration<double>(seconds);
+  while (!stop && Clock::now() < deadline) {
+    if (done()) return true;
+    std::this_thread::sleep_for(100ms);
+  }
+  return false;
+}
+
 int drive(const Cell& cell, const Pose& X_WO0, const DrivenCell& driven, const DriveOptions& options,
           const std::atomic<bool>& stop) {
-  SimulatedRobot robot(robot_options(cell, options));
+  SimulatedRobot robot(driving_robot(cell, options));
   Tour tour(cell, driven, options, robot);
   RobotAnswer zero;
   if (!cell.jobs.front().positions.empty() && !done_within(options.ready_within_s, stop, [&] {

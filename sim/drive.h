@@ -9,14 +9,10 @@
 #include <vector>
 
 #include "config/cell.h"
+#include "sim/hand_errors.h"
+#include "sim/robot.h"
 
 namespace zeropose {
-
-// How far the hand stands from where the robot says: each time anew, and always alike at one place.
-struct RobotErrors {
-  double repeatability_mm = 0.05, repeatability_deg = 0.003;
-  double absolute_mm = 0.5, absolute_deg = 0.02;
-};
 
 // How parts come and how wrong their corrections may be; the truth file of a cell says it. Six numbers are
 // x y z in mm, rx ry rz in degrees.
@@ -32,6 +28,12 @@ struct DriveOptions {
   RobotErrors robot;                              // of the hand that carries a camera
   double ready_within_s = 60;                     // from the start to the robot's first "ready"
 };
+
+// The robot program's side of a robot's link, which must be a Modbus TCP server.
+SimulatedRobotOptions robot_options(const Cell& cell, std::size_t robot);
+
+// Tries until it is done (true), the time is up, or it shall stop.
+bool done_within(double seconds, const std::atomic<bool>& stop, const std::function<bool()>& done);
 
 // What the drive moves; both return when every camera shows it so.
 struct DrivenCell {

@@ -1,5 +1,7 @@
 #include "sim/renderer.h"
 
+#include "sim/ball_plate_look.h"
+
 namespace zeropose {
 
 CameraRenderer::CameraRenderer(const Scene& scene, std::size_t camera)
@@ -10,7 +12,8 @@ CameraRenderer::CameraRenderer(const Scene& scene, std::size_t camera)
       references_(reference_plates(scene, camera)),
       blur_sigma_px_(scene.picture.blur_sigma_px) {}
 
-std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults& faults) const {
+std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults& faults,
+                                                 const std::optional<CarriedBall>& ball) const {
   const auto moved = faults.moved_cameras.find(name_);
   const Pose X_CnCo = moved == faults.moved_cameras.end() ? Pose::Identity() : moved->second.inverse();
   const Pose X_CW = X_CnCo * X_CW_;
@@ -18,6 +21,7 @@ std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults&
   Canvas canvas(rays_, blur_sigma_px_, 0);
   look_->paint(canvas, moment);
   for (const MarkPlate& plate : references_) paint_plate(canvas, plate, X_CW, moment);
+  if (ball) paint_ball(canvas, X_CW * ball->p_W_mm, ball->radius_mm, ball->grey);
   canvas.illuminate(look_->light());
   return std::move(canvas).picture();
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -22,7 +23,8 @@ class CameraRenderer {
 
   // Grey levels, row by row, with blur and without noise, not clamped. The same pose and faults give the same
   // picture bit by bit. May be called from several threads.
-  std::vector<float> clean_picture(const Pose& X_WO, const Faults& faults = {}) const;
+  std::vector<float> clean_picture(const Pose& X_WO, const Faults& faults = {},
+                                   const std::optional<CarriedBall>& ball = std::nullopt) const;
 
  private:
   PixelRays rays_;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -76,6 +77,12 @@ struct Faults {
   std::map<std::string, double> displaced_px;   // marks that sit off their place: by so much to the right in
                                                 // the image, at the same distance
   std::map<std::string, Pose> moved_cameras{};  // X_CoCn by the camera's name
+};
+
+// A ball that a robot carries before the cameras.
+struct CarriedBall {
+  Eigen::Vector3d p_W_mm = Eigen::Vector3d::Zero();
+  double radius_mm = 0, grey = 0;
 };
 
 // The scene of the cell's first job with the truth of the file CELL.sim.json. Throws ConfigError: names file

@@ -63,6 +63,27 @@ void read_components(JsonObject& object, std::string_view key, Vector6& six) {
     object.add_mistake(key, "a number below 0", "six numbers, none below 0");
 }
 
+RobotErrors read_errors(JsonObject& object) {
+  RobotErrors errors;
+  object.read("repeatability_mm", errors.repeatability_mm, NumberRange{0, 100});
+  object.read("repeatability_deg", errors.repeatability_deg, NumberRange{0, 10});
+  object.read("absolute_mm", errors.absolute_mm, NumberRange{0, 100});
+  object.read("absolute_deg", errors.absolute_deg, NumberRange{0, 10});
+  return errors;
+}
+
+SurveyDrive read_survey(JsonObject& object) {
+  SurveyDrive survey;
+  object.read("camera", survey.camera);
+  object.read("ball_in_hand_mm", survey.p_HT_mm, 1e4);
+  object.read("radius_mm", survey.radius_mm, NumberRange{0, 1000, true});
+  object.read("grey", survey.grey, NumberRange{0, 255});
+  object.read("first_hand_pose", survey.X_RH_first);
+  object.read("step_mm", survey.step_mm, 1e4);
+  object.read_optional("robot", [&](JsonObject& robot) { survey.errors = read_errors(robot); });
+  return survey;
+}
+
 DriveOptions read_drive(JsonObject& object) {
   DriveOptions drive;
   object.read_each_optional("poses", [&](JsonObject& pose) {
@@ -73,12 +94,7 @@ DriveOptions read_drive(JsonObject& object) {
   object.read_optional("beyond_every", drive.beyond_every, 0, 1000);
   read_components(object, "max_error", drive.max_error);
   object.read_optional("max_error_at_points_mm", drive.max_error_at_points_mm, NumberRange{0, 1e5});
-  object.read_optional("robot", [&](JsonObject& robot) {
-    robot.read("repeatability_mm", drive.robot.repeatability_mm, NumberRange{0, 100});
-    robot.read("repeatability_deg", drive.robot.repeatability_deg, NumberRange{0, 10});
-    robot.read("absolute_mm", drive.robot.absolute_mm, NumberRange{0, 100});
-    robot.read("absolute_deg", drive.robot.absolute_deg, NumberRange{0, 10});
-  });
+  object.read_optional("robot", [&](JsonObject& robot) { drive.robot = read_errors(robot); });
   object.read_optional("robot_max_mm", drive.robot_max_mm, NumberRange{0, 1e5, true});
   object.read_optional("robot_max_deg", drive.robot_max_deg, NumberRange{0, 180, true});
   return drive;
@@ -94,6 +110,8 @@ SimFile load_sim_file(const std::filesystem::path& path) {
     top.read("cameras", [&](JsonObject& cameras) { file.cameras = read_cameras(cameras); });
     top.read_optional("object", [&](JsonObject& object) { file.object = read_object_truth(object); });
     top.read_optional("drive", [&](JsonObject& drive) { file.drive = read_drive(drive); });
+    top.read_each_optional("surveys",
+                           [&](JsonObject& survey) { file.surveys.push_back(read_survey(survey)); });
     top.read("picture", [&](JsonObject& picture) { file.picture = read_picture(picture); });
   });
   reading.throw_if_wrong();

@@ -11,6 +11,7 @@
 #include "calib/camera_model.h"
 #include "sim/drive.h"
 #include "sim/scene.h"
+#include "sim/survey_drive.h"
 
 namespace zeropose {
 
@@ -19,6 +20,7 @@ struct SimFile {
   ObjectTruth object;
   PictureSettings picture;
   std::optional<DriveOptions> drive;
+  std::vector<SurveyDrive> surveys;
 };
 
 // JSON with comments. Throws ConfigError with all mistakes: unreadable file, unknown or missing keys, wrong

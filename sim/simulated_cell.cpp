@@ -33,10 +33,11 @@ CellPictures::CellPictures(const Scene& scene)
   show(scene.X_WO_nominal, {});
 }
 
-void CellPictures::show(const Pose& X_WO, const Faults& faults) {
+void CellPictures::show(const Pose& X_WO, const Faults& faults, const std::optional<CarriedBall>& ball) {
   std::vector<std::future<Clean>> under_way;
   for (const CameraRenderer& renderer : renderers_)
-    under_way.push_back(std::async(std::launch::async, [&] { return renderer.clean_picture(X_WO, faults); }));
+    under_way.push_back(
+        std::async(std::launch::async, [&] { return renderer.clean_picture(X_WO, faults, ball); }));
   std::vector<std::shared_ptr<const Clean>> fresh;
   for (auto& picture : under_way) fresh.push_back(std::make_shared<const Clean>(picture.get()));
   const std::lock_guard lock(mutex_);
@@ -81,7 +82,7 @@ void SimulatedCell::render() {
     const auto moved = faults_.moved_cameras.find(camera);
     now.moved_cameras[camera] = moved == faults_.moved_cameras.end() ? X_CoCn : X_CoCn * moved->second;
   }
-  pictures_.show(X_WO_, now);
+  pictures_.show(X_WO_, now, ball_);
   if (gige_) gige_->picture_changed();
   if (v4l2_) v4l2_->picture_changed();
 }
@@ -89,6 +90,7 @@ void SimulatedCell::render() {
 void SimulatedCell::show(const Pose& X_WO) {
   const std::lock_guard lock(mutex_);
   X_WO_ = X_WO;
+  ball_.reset();
   render();
 }
 
@@ -99,6 +101,14 @@ void SimulatedCell::move_hand(std::size_t robot, const Pose& X_RH) {
     const CalibratedCamera& camera = scene_.cameras[hand.camera];
     carried_[camera.name] = camera.X_WC.inverse() * hand.X_WR * X_RH * hand.X_HC;
   }
+  render();
+}
+
+void SimulatedCell::show_ball(const CarriedBall& ball) {
+  constexpr double out_of_sight_mm = 1e6;
+  const std::lock_guard lock(mutex_);
+  X_WO_.translation().x() = out_of_sight_mm;
+  ball_ = ball;
   render();
 }
 

@@ -21,7 +21,8 @@ class CellPictures {
  public:
   explicit CellPictures(const Scene& scene);  // shows the object at its nominal pose
 
-  void show(const Pose& X_WO, const Faults& faults);  // renders all cameras side by side
+  // Renders all cameras side by side.
+  void show(const Pose& X_WO, const Faults& faults, const std::optional<CarriedBall>& ball = std::nullopt);
   // The frame that a camera takes now, from pixel `first` on; the noise of every call is new. One thread for
   // each camera at a time.
   void draw(std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first = 0);
@@ -45,8 +46,10 @@ class SimulatedCell {
 
   // X_WO. Frames exposed after the return show the object there; the same for all faults.
   void show(const Pose& X_WO);
-  // Moves a robot's hand, and what it carries, to where it truly is.
+  // Moves a robot's hand, and the cameras that it carries, to where it truly is.
   void move_hand(std::size_t robot, const Pose& X_RH);
+  // Takes the object away and shows a ball instead.
+  void show_ball(const CarriedBall& ball);
   Pose pose() const;
   Faults faults() const;
   const Scene& scene() const { return scene_; }
@@ -70,6 +73,7 @@ class SimulatedCell {
   mutable std::mutex mutex_;
   Pose X_WO_;
   Faults faults_;
+  std::optional<CarriedBall> ball_;
   std::map<std::string, Pose> carried_;  // X_CoCn of the cameras on hands, from where they are in the scene
   CellPictures pictures_;
   std::unique_ptr<GigeServer> gige_;  // one of the two

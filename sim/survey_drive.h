@@ -1,0 +1,34 @@
+// The robot program of a ball grid (spec 40 P2): a robot carries a ball to 3 x 3 x 3 positions before one
+// camera, says where its hand is, and tells a position again that was not taken.
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <string>
+
+#include "config/cell.h"
+#include "sim/hand_errors.h"
+#include "sim/scene.h"
+
+namespace zeropose {
+
+// From the truth file of a cell. The ball's centre is fixed in the hand, whose first position is X_RH_first;
+// the others follow along the axes of the robot's base.
+struct SurveyDrive {
+  std::string camera;     // that the grid is for
+  std::size_t robot = 0;  // of the cell
+  Eigen::Vector3d p_HT_mm = Eigen::Vector3d::Zero();
+  double radius_mm = 0, grey = 0;
+  Pose X_RH_first = Pose::Identity();
+  Eigen::Vector3d step_mm = Eigen::Vector3d::Zero();
+  RobotErrors errors;
+};
+
+inline constexpr int survey_positions = 27;
+Pose survey_position(const SurveyDrive& survey, int position);  // from 0
+
+// Returns the exit status: 0 when every position was taken. Waits for the daemon's survey to begin.
+int drive_survey(const Cell& cell, const SurveyDrive& survey,
+                 const std::function<void(const CarriedBall&)>& show, const std::atomic<bool>& stop);
+
+}  // namespace zeropose
