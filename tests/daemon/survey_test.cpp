@@ -1,0 +1,127 @@
+// What a survey takes of what a robot tells, and why not.
+#include "daemon/survey.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/board_picture.h"
+
+namespace zeropose {
+namespace {
+
+using Eigen::Vector2d;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr double noise = 2;
+
+class BallSurvey : public testing::Test {
+ protected:
+  static SurveyOptions options() {
+    BallTarget ball;
+    ball.search.kind = MarkKind::ball;
+    ball.search.min_diameter_px = 20;
+    ball.search.max_diameter_px = 60;
+    return {2, ball, 3};
+  }
+  test::Pixels picture(const std::vector<Vector2d>& balls_px) {
+    test::Drawing drawing;
+    drawing.width_px = 300, drawing.height_px = 200;
+    for (const Vector2d& ball : balls_px) drawing.figures.push_back(test::ellipse(ball, 36, 1, 0, 60));
+    return test::expose(test::paint(drawing), noise, random_);
+  }
+  SurveyVerdict look(int position, const std::vector<Vector2d>& first, const std::vector<Vector2d>& second,
+                     const Pose& X_RH = Pose::Identity()) {
+    const test::Pixels a = picture(first), b = picture(second);
+    return survey.look(position, X_RH, a.view(), b.view());
+  }
+  SurveyVerdict look(int position, const Vector2d& ball, const Pose& X_RH = Pose::Identity()) {
+    return look(position, {ball}, {ball}, X_RH);
+  }
+
+  Survey survey{options()};
+
+ private:
+  std::mt19937_64 random_{5};
+};
+
+TEST_F(BallSurvey, KeepsWhereTheBallIsWithWhereTheHandWas) {
+  const Pose X_RH = from_six_numbers({100, 200, 300, 10, 20, 30});
+  const SurveyVerdict verdict = look(2, {120.3, 80.6}, X_RH);
+  EXPECT_EQ(verdict.code, Code::ok) << verdict.reason;
+  ASSERT_TRUE(survey.views().contains(2));
+  const SurveyView& view = survey.views().at(2);
+  EXPECT_TRUE(view.X_RH.isApprox(X_RH));
+  ASSERT_EQ(view.points.size(), 1u);
+  EXPECT_LT((view.points[0].u_px - Vector2d(120.3, 80.6)).norm(), 0.1);
+  EXPECT_THAT(survey.missing(), ElementsAre(1, 3));
+}
+
+TEST_F(BallSurvey, TheLastWordCounts) {
+  look(1, {100, 100});
+  look(1, {150, 90});
+  EXPECT_NEAR(survey.views().at(1).points[0].u_px.x(), 150, 0.1);
+}
+
+TEST_F(BallSurvey, ABallOutOfSightIsNotTaken) {
+  const SurveyVerdict verdict = look(1, {}, {});
+  EXPECT_EQ(verdict.code, Code::too_few_marks);
+  EXPECT_THAT(verdict.reason, HasSubstr("no ball is in sight"));
+  EXPECT_EQ(look(1, {295, 100}).code, Code::too_few_marks) << "half of it is beyond the picture";
+  EXPECT_THAT(survey.missing(), ElementsAre(1, 2, 3));
+}
+
+TEST_F(BallSurvey, TwoBallsAreOneTooMany) {
+  const SurveyVerdict verdict = look(1, {{100, 100}, {200, 60}}, {{100, 100}, {200, 60}});
+  EXPECT_EQ(verdict.code, Code::too_few_marks);
+  EXPECT_THAT(verdict.reason, HasSubstr("2 things in the picture pass for the ball"));
+}
+
+TEST_F(BallSurvey, ARobotThatStillMovesIsNamed) {
+  const SurveyVerdict verdict = look(1, {{100, 100}}, {{100.6, 100}});
+  EXPECT_EQ(verdict.code, Code::not_standing_still);
+  EXPECT_THAT(verdict.reason, HasSubstr("moved by 0.6"));
+  EXPECT_EQ(look(1, {{100, 100}}, {{100.05, 100}}).code, Code::ok) << "less than the noise tells";
+}
+
+TEST_F(BallSurvey, PositionsCountFromOne) {
+  for (const int position : {0, -1, 4})
+    EXPECT_EQ(look(position, {100, 100}).code, Code::argument_out_of_range);
+  SurveyOptions none = options();
+  none.positions = 0;
+  EXPECT_THROW(Survey{none}, std::invalid_argument);
+}
+
+test::BoardScene board(BoardKind kind, int rows) {
+  test::BoardScene scene;
+  scene.kind = kind;
+  scene.rows = rows, scene.cols = 6;
+  scene.pitch_mm = 12, scene.diameter_mm = 10;
+  scene.X_CB = test::board_pose(scene, 500, 0.3, 0.4, 0.2);
+  return scene;
+}
+
+SurveyVerdict look_at(const test::BoardScene& scene, Survey& survey) {
+  std::mt19937_64 random(3);
+  const test::Pixels picture = test::expose(test::paint(scene), noise, random);
+  return survey.look(1, Pose::Identity(), picture.view(), picture.view());
+}
+
+TEST(BoardSurvey, TakesABoardThatLooksDifferentFromEverySide) {
+  const test::BoardScene scene = board(BoardKind::asymmetric_circles, 7);
+  Survey survey({0, BoardTarget{scene.problem()}, 1});
+  const SurveyVerdict verdict = look_at(scene, survey);
+  ASSERT_EQ(verdict.code, Code::ok) << verdict.reason;
+  EXPECT_EQ(survey.views().at(1).points.size(), 42u);
+}
+
+TEST(BoardSurvey, RefusesABoardWhoseFrameMayTurn) {
+  const test::BoardScene scene = board(BoardKind::circles, 7);
+  Survey survey({0, BoardTarget{scene.problem()}, 1});
+  const SurveyVerdict verdict = look_at(scene, survey);
+  EXPECT_EQ(verdict.code, Code::too_few_marks);
+  EXPECT_THAT(verdict.reason, HasSubstr("the board looks the same from 2 sides"));
+}
+
+}  // namespace
+}  // namespace zeropose
