@@ -38,7 +38,7 @@ class Differences {
     for (double& deg : difference.tail<3>()) deg = std::remainder(deg, 360);
     all_.push_back(difference);
   }
-  std::size_t count() const { return all_.size(); }
+  const Vector6& last() const { return all_.back(); }
   Vector6 largest_from_mean() const {
     Vector6 mean = Vector6::Zero(), largest = Vector6::Zero();
     for (const Vector6& one : all_) mean += one / static_cast<double>(all_.size());
@@ -99,6 +99,7 @@ TEST_F(GunCheck, HalvesThePublishedDeviations) {
     EXPECT_GE(pose.effective_marks, 6) << "position " << i + 1;
     EXPECT_THAT(pose.removed, IsEmpty()) << "position " << i + 1;
     differences.add(zero->zero.X_WO0.inverse() * pose.X_WO, poses[i]);
+    print(std::to_string(i + 1).c_str(), differences.last());
   }
   const Vector6 largest = differences.largest_from_mean();
   print("rendered, calibration of seed 1", largest);

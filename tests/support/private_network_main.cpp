@@ -9,7 +9,8 @@
 
 int main(int argc, char** argv) {
   ::testing::InitGoogleTest(&argc, argv);
-  const std::vector<std::string> addresses = {"127.0.0.11", "127.0.0.12", "127.0.0.13", "127.0.0.14"};
+  const std::vector<std::string> addresses = {"127.0.0.11", "127.0.0.12", "127.0.0.13", "127.0.0.14",
+                                              "127.0.0.31"};
   const std::string impossible = zeropose::enter_private_network(addresses);
   if (!impossible.empty()) {
     std::printf("skipped, all of them: %s\n", impossible.c_str());
