@@ -66,6 +66,10 @@ TEST_F(PressShop, FindsCornersAndHolesWhereTheyAre) {
   test::Random unused(1);
   const auto exact = test::observe(cell->scene().cameras, job(), X_WO, 0, unused);
   ASSERT_EQ(found.size(), exact.size());
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const double away = (found[i].u_px - exact[i].u_px).norm();
+    std::printf("%s %.3f %.3f\n", job().marks[found[i].mark].name.c_str(), away, std::sqrt(found[i].covariance_px2.trace()));
+  }
   for (std::size_t i = 0; i < found.size(); ++i)
     EXPECT_LT((found[i].u_px - exact[i].u_px).norm(), 0.15) << job().marks[found[i].mark].name;
 }
