@@ -116,8 +116,11 @@ TEST_F(GunCheck, FindsBallsWhereTheyAre) {
   test::Random unused(1);
   const auto exact = test::observe(cell->scene().cameras, real, cell->zero_pose(), 0, unused);
   ASSERT_EQ(found.size(), exact.size());
+  constexpr double background_px = 0.005;  // what dirt and the lamps behind the plate do
   for (std::size_t i = 0; i < found.size(); ++i)
-    EXPECT_LT((found[i].u_px - exact[i].u_px).norm(), 0.03) << job().marks[found[i].mark].name;
+    EXPECT_LT((found[i].u_px - exact[i].u_px).norm(),
+              4 * std::sqrt(found[i].covariance_px2.trace()) + background_px)
+        << job().marks[found[i].mark].name;
 }
 
 // Within the limits ok and how far off, beyond them the code of the limit.
