@@ -88,7 +88,7 @@ class OutlineInTile {
 
   Lies lies() const { return lies_; }
 
-  // Of a sample, and for how many more on each side it stays the same at least.
+  // Of a sample, and how many of its neighbours on any side have the same at least.
   struct Share {
     double share = 0;
     int steps = 0;

@@ -107,6 +107,38 @@ TEST(Cell, NamesWhatIsWrongWithAReferencePoint) {
   EXPECT_THAT(mistake("colour", "red"), HasSubstr("reference_points[1].colour: found an unknown key"));
 }
 
+TEST(Cell, ReadsACorner) {
+  const auto with_edges = [](const Json& edges) {
+    Json json = example();
+    json["jobs"][0]["marks"][2]["kind"] = "bright_corner";
+    json["jobs"][0]["marks"][2]["edges"] = edges;
+    return json;
+  };
+  const Json good = with_edges({{1, 0, 0}, {0, 0.6, 0.804}});
+  const Mark mark = parse_cell({good.dump(), "", example_calibration_text(), ""}).jobs[0].marks[2];
+  EXPECT_EQ(mark.kind, MarkKind::corner);
+  EXPECT_TRUE(mark.bright);
+  ASSERT_EQ(mark.edges_O.size(), 2U);
+  EXPECT_NEAR(mark.edges_O[1].norm(), 1, 1e-12);
+  for (const Json& edges : {Json({{1, 0, 0}}), Json({{1, 0, 0}, {0, 2, 0}}), Json({{1, 0, 0}, {-1, 0, 0}})})
+    EXPECT_THAT(mistakes_in(with_edges(edges)),
+                ElementsAre(HasSubstr("jobs[0].marks[2].edges: found no two")))
+        << edges;
+  Json reference = example();
+  reference["reference_points"][1]["kind"] = "dark_corner";
+  EXPECT_THAT(mistakes_in(reference), ElementsAre(HasSubstr("reference_points[1].kind: found a corner")));
+}
+
+class ExampleCell : public testing::TestWithParam<const char*> {};
+
+TEST_P(ExampleCell, IsValid) {
+  const Cell cell = load_cell(std::string(ZEROPOSE_SOURCE_DIR "/config/cells/") + GetParam() + ".json");
+  EXPECT_EQ(cell.name, GetParam());
+  EXPECT_TRUE(cell.simulated);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ExampleCell, testing::Values("car-body", "press-shop", "gun-check"));
+
 TEST(Cell, ReadsTheOptionalKeys) {
   Json json = example();
   json["$schema"] = "../cell.schema.json";
@@ -225,7 +257,14 @@ INSTANTIATE_TEST_SUITE_P(
                 "jobs[0].marks[3].weight: found -0.1, expected a number from 0 to 1"},
         Mistake{"/jobs/0/marks/3/kind", "\"cross\"",
                 "jobs[0].marks[3].kind: found \"cross\", expected one of dark_disc, bright_disc, dark_ring, "
-                "bright_ring, dark_ball, bright_ball, dark_slot, bright_slot, dark_cross, bright_cross"},
+                "bright_ring, dark_ball, bright_ball, dark_slot, bright_slot, dark_cross, bright_cross, "
+                "dark_corner, "
+                "bright_corner"},
+        Mistake{"/jobs/0/marks/3/kind", "\"bright_corner\"",
+                "jobs[0].marks[3].edges: found a corner without them, expected two unit vectors along the "
+                "corner's edges, away from it, 15 to 165 degrees apart"},
+        Mistake{"/jobs/0/marks/3/edges", "[[1, 0, 0], [0, 1, 0]]",
+                "jobs[0].marks[3].edges: found a mark that is no corner, expected no such key"},
         Mistake{"/jobs/0/marks/3/kind", "\"bright_ring\"",
                 "jobs[0].marks[3].inner_radius_mm: found a ring without it, expected the radius of the "
                 "ring's inner "

@@ -54,6 +54,8 @@ Json full_example() {
   json["jobs"][0]["marks"][0]["sigma_mm"] = 0.1;
   json["jobs"][0]["marks"][0]["kind"] = "dark_ring";
   json["jobs"][0]["marks"][0]["inner_radius_mm"] = 1;
+  json["jobs"][0]["marks"][1]["kind"] = "bright_corner";
+  json["jobs"][0]["marks"][1]["edges"] = {{1, 0, 0}, {0, 1, 0}};
   json["jobs"][0]["planar"] = {0, 0, 0, 0, 0, 0};
   json["jobs"][0]["requirements"]["max_hidden_mm"] = 1.5;
   json["jobs"][0]["requirements"]["max_displacement_mm"] = 45;
@@ -98,7 +100,7 @@ std::vector<std::string> mistakes_of(const Json& full) {
 // The place of a key in the example: each driver has keys of its own and a camera of its own there, each type
 // of link a robot.
 Json::json_pointer place_of_key(const Json& full, const std::string& pointer) {
-  for (const std::string list : {"/cameras/", "/robots/"})
+  for (const std::string list : {"/cameras/", "/robots/", "/jobs/0/marks/"})
     for (std::size_t i = 0; i < 5; ++i) {
       std::string moved = pointer;
       if (moved.starts_with(list + "0/")) moved.replace(0, list.size() + 1, list + std::to_string(i));

@@ -38,7 +38,7 @@ class Differences {
     for (double& deg : difference.tail<3>()) deg = std::remainder(deg, 360);
     all_.push_back(difference);
   }
-  std::size_t count() const { return all_.size(); }
+  const Vector6& last() const { return all_.back(); }
   Vector6 largest_from_mean() const {
     Vector6 mean = Vector6::Zero(), largest = Vector6::Zero();
     for (const Vector6& one : all_) mean += one / static_cast<double>(all_.size());
@@ -99,6 +99,7 @@ TEST_F(GunCheck, HalvesThePublishedDeviations) {
     EXPECT_GE(pose.effective_marks, 6) << "position " << i + 1;
     EXPECT_THAT(pose.removed, IsEmpty()) << "position " << i + 1;
     differences.add(zero->zero.X_WO0.inverse() * pose.X_WO, poses[i]);
+    print(std::to_string(i + 1).c_str(), differences.last());
   }
   const Vector6 largest = differences.largest_from_mean();
   print("rendered, calibration of seed 1", largest);
@@ -115,8 +116,11 @@ TEST_F(GunCheck, FindsBallsWhereTheyAre) {
   test::Random unused(1);
   const auto exact = test::observe(cell->scene().cameras, real, cell->zero_pose(), 0, unused);
   ASSERT_EQ(found.size(), exact.size());
+  constexpr double background_px = 0.005;  // what dirt and the lamps behind the plate do
   for (std::size_t i = 0; i < found.size(); ++i)
-    EXPECT_LT((found[i].u_px - exact[i].u_px).norm(), 0.03) << job().marks[found[i].mark].name;
+    EXPECT_LT((found[i].u_px - exact[i].u_px).norm(),
+              4 * std::sqrt(found[i].covariance_px2.trace()) + background_px)
+        << job().marks[found[i].mark].name;
 }
 
 // Within the limits ok and how far off, beyond them the code of the limit.

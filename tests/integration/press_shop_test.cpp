@@ -57,7 +57,7 @@ TEST_F(PressShop, CorrectsTheSheetsEnds) {
   }
 }
 
-// Corners and holes, found in pictures without noise, are where the true cameras project them.
+// Corners and holes are found where the true cameras project them.
 TEST_F(PressShop, FindsCornersAndHolesWhereTheyAre) {
   const Pose X_WO = cell->zero_pose() * from_six_numbers({24, -31, 0, 0, 0, 1.3});
   test::Exposed frame = cell->exposed(cell->clean(X_WO));
@@ -66,8 +66,11 @@ TEST_F(PressShop, FindsCornersAndHolesWhereTheyAre) {
   test::Random unused(1);
   const auto exact = test::observe(cell->scene().cameras, job(), X_WO, 0, unused);
   ASSERT_EQ(found.size(), exact.size());
+  constexpr double texture_px = 0.02;  // what the steel's grain and shading do
   for (std::size_t i = 0; i < found.size(); ++i)
-    EXPECT_LT((found[i].u_px - exact[i].u_px).norm(), 0.15) << job().marks[found[i].mark].name;
+    EXPECT_LT((found[i].u_px - exact[i].u_px).norm(),
+              4 * std::sqrt(found[i].covariance_px2.trace()) + texture_px)
+        << job().marks[found[i].mark].name;
 }
 
 TEST_F(PressShop, GoesOnWithACornerCovered) {
