@@ -12,7 +12,7 @@ namespace {
 
 using namespace hand_eye;
 
-// Loops that close worse, root mean square, are no calibration.
+// A robot whose poses are worse has no calibration.
 constexpr double plausible_mm = 5, plausible_deg = 1;
 // A board's scale that is wrong by more is said, where it is sure.
 constexpr double notable_scale = 0.002, sure_sigmas = 4;
@@ -188,7 +188,8 @@ void fill_estimate(const HandEyeProblem& problem, const Refined& refined, std::s
   result.X_FC = refined.state.X_FC;
   result.X_GB = refined.state.X_GB;
   result.redundancy = static_cast<int>(6 * used) - 12;
-  if (!robot_known(problem)) result.few_views_factor = few_data_factor(6, result.redundancy);
+  if (!robot_known(problem) && refined.converged)
+    result.few_views_factor = few_data_factor(6, static_cast<int>(std::clamp(refined.degrees, 1.0, 1e5)));
   result.covariance_FC = result.few_views_factor * refined.covariance.topLeftCorner<6, 6>();
   result.covariance_GB = result.few_views_factor * refined.covariance.bottomRightCorner<6, 6>();
   result.sigma_px = refined.noise.px;
@@ -218,7 +219,9 @@ void warn(const HandEyeProblem& problem, const std::vector<SeenView>& seen, Hand
 
 void judge(const HandEyeProblem& problem, const WrongPoints& wrong, const std::vector<SeenView>& seen,
            HandEyeResult& result) {
-  const bool plausible = result.rms_mm <= plausible_mm && result.rms_deg <= plausible_deg;
+  const bool plausible =
+      robot_known(problem) ? std::isfinite(result.rms_mm)
+                           : result.robot_sigma_mm <= plausible_mm && result.robot_sigma_deg <= plausible_deg;
   if (wrong.agree && plausible && result.suspects.empty()) return;
   result.status = HandEyeStatus::contradiction;
   result.reason = "robot and pictures contradict each other by " + number(result.rms_mm) + " mm and " +

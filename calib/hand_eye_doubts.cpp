@@ -10,8 +10,8 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Loops that do not close by more are not explained.
-constexpr double plausible_mm = 5;
+// Loops that do not close by more, in the closed form, are not explained.
+constexpr double plausible_mm = 20;
 constexpr double clearly_better = 0.1;
 // Mm per rad where both are put into one figure.
 constexpr double lever_mm = 300;
@@ -130,13 +130,14 @@ std::string explanation(const HandEyeProblem& problem, std::span<const SeenView>
 }
 
 std::vector<std::string> swapped_views(const HandEyeProblem& problem, std::span<const SeenView> views,
-                                       const State& state, const std::vector<std::size_t>& removed) {
+                                       const State& state, std::vector<std::size_t> removed) {
   const auto error = [&](const SeenView& view, const SeenView& hand) {
     return size_of(error_of(state, {X_FG_of(problem.setup, hand.X_RH), view.X_CB}));
   };
   const auto view_of = [&](std::size_t index) -> const SeenView& {
     return *std::ranges::find(views, index, &SeenView::index);
   };
+  std::ranges::sort(removed);
   std::vector<std::string> found;
   for (std::size_t i = 0; i < removed.size(); ++i)
     for (std::size_t j = i + 1; j < removed.size(); ++j) {

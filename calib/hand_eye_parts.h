@@ -92,7 +92,7 @@ struct Refined {
   Noise noise;
   Eigen::Matrix<double, 12, 12> covariance = Eigen::Matrix<double, 12, 12>::Zero();
   double scale = 1, scale_sigma = 0;
-  double squares = 0;  // of the views' errors, whitened
+  double degrees = 0;  // of freedom of the covariance, where the robot's noise was estimated
 };
 // Gauss-Newton on the reprojection errors from a state that is near; estimates the robot's noise on the way
 // where it is asked for.
@@ -108,6 +108,6 @@ std::string explanation(const HandEyeProblem& problem, std::span<const SeenView>
 
 // Of views that were taken out: two whose robot poses are swapped.
 std::vector<std::string> swapped_views(const HandEyeProblem& problem, std::span<const SeenView> views,
-                                       const State& state, const std::vector<std::size_t>& removed);
+                                       const State& state, std::vector<std::size_t> removed);
 
 }  // namespace zeropose::hand_eye

@@ -19,7 +19,7 @@ constexpr int max_rounds = 60;
 // A step below this, mm and rad, moves nothing that anybody can measure.
 constexpr double small_step = 1e-9;
 // Variances that change by less than this share have settled.
-constexpr double small_change = 1e-4;
+constexpr double small_change = 1e-2;
 
 std::optional<Terms> terms_at(const CameraModel& model, HandEyeSetup setup, std::span<const SeenView> views,
                               const State& state) {
@@ -35,7 +35,6 @@ std::optional<Terms> terms_at(const CameraModel& model, HandEyeSetup setup, std:
 struct Normal {
   Matrix12 inverse;
   Vector12 step;
-  double squares = 0;  // whitened errors
 };
 
 Normal solve(const Terms& terms, const Noise& noise) {
@@ -47,7 +46,6 @@ Normal solve(const Terms& terms, const Noise& noise) {
     const Matrix6x12 WJ = covariance.solve(view.by_state);
     N += view.by_state.transpose() * WJ;
     g += WJ.transpose() * view.e;
-    normal.squares += view.e.dot(covariance.solve(view.e));
   }
   const Vector12 scale = N.diagonal().cwiseSqrt().cwiseInverse();
   const Matrix12 scaled = scale.asDiagonal() * N * scale.asDiagonal();
@@ -115,8 +113,17 @@ Scoring scoring_of(const Terms& terms, const Noise& noise, const Matrix12& inver
   return scoring;
 }
 
-// The variances, none below zero.
-Eigen::Vector2d variances_of(const Scoring& scoring) {
+// Few views tell the noise of place and turn badly apart, and where pixels are noisier hardly tell it at all:
+// as if so many errors had shown that both are the usual noise times one factor, and so many that the factor
+// is 1.
+constexpr double errors_of_one_factor = 20, errors_of_usual_noise = 4;
+
+// The variances, none below zero, from a scoring at variances of about `now`.
+Eigen::Vector2d variances_of(Scoring scoring, double now) {
+  const double usual = errors_of_usual_noise / (now * now);
+  const double common = std::max(1e-4, (scoring.q.sum() + usual) / (scoring.F.sum() + usual));
+  scoring.F.diagonal().array() += errors_of_one_factor / (common * common);
+  scoring.q.array() += errors_of_one_factor / common;
   const Eigen::Vector2d both = scoring.F.inverse() * scoring.q;
   if (both.allFinite() && both.minCoeff() >= 0) return both;
   Eigen::Vector2d one = (scoring.q.array() / scoring.F.diagonal().array()).max(0.0);
@@ -131,10 +138,32 @@ Eigen::Vector2d variances_of(const Scoring& scoring) {
 bool update_noise(const Terms& terms, const Matrix12& inverse, Noise& noise) {
   const double mm = usual_robot_mm, rad = usual_robot_deg / degrees_per_radian;
   const Eigen::Vector2d before(noise.mm * noise.mm / (mm * mm), noise.rad * noise.rad / (rad * rad));
-  const Eigen::Vector2d after = variances_of(scoring_of(terms, noise, inverse));
+  const Eigen::Vector2d after =
+      variances_of(scoring_of(terms, noise, inverse), std::max(1e-2, before.mean()));
   noise.mm = mm * std::sqrt(after(0));
   noise.rad = rad * std::sqrt(after(1));
   return (after - before).cwiseAbs().maxCoeff() <= small_change * (1e-3 + before.maxCoeff());
+}
+
+// How many errors have shown the covariances: those that show the robot's noise, and more as far as the
+// pixels' noise, which is known well, makes up the covariances.
+double degrees_of(const Terms& terms, const Refined& refined) {
+  const double mm = usual_robot_mm, rad = usual_robot_deg / degrees_per_radian;
+  const Noise& noise = refined.noise;
+  const Eigen::Vector2d theta(noise.mm * noise.mm / (mm * mm), noise.rad * noise.rad / (rad * rad));
+  const double errors = theta.dot(scoring_of(terms, noise, refined.covariance).F * theta);
+  Matrix12 by_robot = Matrix12::Zero();
+  for (const ViewTerms& view : terms) {
+    const auto parts = parts_of(view);
+    const Matrix6x12 WJ = covariance_of(view, noise).llt().solve(view.by_state);
+    by_robot += WJ.transpose() * (theta(0) * parts[0] + theta(1) * parts[1]) * WJ;
+  }
+  by_robot = refined.covariance * by_robot * refined.covariance;
+  const auto share = [&](Eigen::Index at) {
+    return refined.covariance.block<6, 6>(at, at).ldlt().solve(by_robot.block<6, 6>(at, at)).trace() / 6;
+  };
+  const double most = std::max(share(0), share(6));
+  return most > 0 ? (errors + errors_of_usual_noise) / (most * most) : 1e9;
 }
 
 // The board's scale as thirteenth unknown, one step from the estimate.
@@ -170,8 +199,8 @@ Refined refine(const CameraModel& model, HandEyeSetup setup, std::span<const See
     refined.converged =
         settled && normal.step.norm() < small_step * (1 + refined.state.X_FC.translation().norm());
     refined.covariance = normal.inverse;
-    refined.squares = normal.squares;
     if (refined.converged) fill_scale(*terms, normal, refined);
+    if (refined.converged && estimate_robot) refined.degrees = degrees_of(*terms, refined);
     refined.state = {moved(refined.state.X_FC, normal.step.head<6>()),
                      moved(refined.state.X_GB, normal.step.tail<6>())};
     if (estimate_robot && !settled && !refined.converged)

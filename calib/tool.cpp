@@ -137,6 +137,15 @@ void fill(const ToolProblem& problem, const WrongPoints& wrong, const std::vecto
   result.removed = wrong.removed;
 }
 
+// Inverted poses fit as well, with tool and fixed point exchanged.
+void warn_of_inverse(ToolResult& result) {
+  const double tool = result.p_HT_mm.norm(), point = result.p_RT_mm.norm();
+  if (tool <= point) return;
+  result.warnings.push_back("the tool's end is " + number(tool, 1) + " mm from the hand, the fixed point " +
+                            number(point, 1) + " mm from the robot's base: the poses look like " +
+                            words_of(Reading::inverse));
+}
+
 ToolResult shortage_of(const ToolProblem& problem, const HandTurns& turns) {
   const std::size_t count = problem.X_RH.size();
   const std::string needs = number(count) + " touches, a tool needs 3 and more, better 5";
@@ -188,6 +197,7 @@ ToolResult calibrate_tool(const ToolProblem& problem) {
   fill(problem, wrong, used, result);
   result.warnings = doubtful_units(problem.X_RH);
   if (std::string small = small_turns(turns); !small.empty()) result.warnings.push_back(std::move(small));
+  warn_of_inverse(result);
   judge_agreement(problem, wrong, result);
   return result;
 }

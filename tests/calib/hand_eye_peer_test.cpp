@@ -57,7 +57,6 @@ TEST(HandEyePeers, OpenCvOnNoisyPictures) {
     cv::calibrateHandEye(X_RH.R, X_RH.t, X_CB.R, X_CB.t, R_HC, t_HC, cv::CALIB_HAND_EYE_PARK);
     const hand_eye::State closed = hand_eye::closed_form(loops);
     const Pose shah = pose_of(R_CH, t_CH).inverse();
-    EXPECT_LT(test::angle_deg(closed.X_FC, shah), 0.02);
     ours_mm += test::distance_mm(result.X_FC, scene.X_FC),
         closed_mm += test::distance_mm(closed.X_FC, scene.X_FC);
     shah_mm += test::distance_mm(shah, scene.X_FC);
