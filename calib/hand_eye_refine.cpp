@@ -117,32 +117,27 @@ Scoring scoring_of(const Terms& terms, const Noise& noise, const Matrix12& inver
 // as if so many errors had shown that both are the usual noise times one factor, and so many that the factor
 // is 1.
 constexpr double errors_of_one_factor = 20, errors_of_usual_noise = 4;
+constexpr double least_variance = 1e-4;
 
-// The variances, none below zero, from a scoring at variances of about `now`.
-Eigen::Vector2d variances_of(Scoring scoring, double now) {
-  const double usual = errors_of_usual_noise / (now * now);
-  const double common = std::max(1e-4, (scoring.q.sum() + usual) / (scoring.F.sum() + usual));
-  scoring.F.diagonal().array() += errors_of_one_factor / (common * common);
-  scoring.q.array() += errors_of_one_factor / common;
-  const Eigen::Vector2d both = scoring.F.inverse() * scoring.q;
-  if (both.allFinite() && both.minCoeff() >= 0) return both;
-  Eigen::Vector2d one = (scoring.q.array() / scoring.F.diagonal().array()).max(0.0);
-  if (!one.allFinite()) return Eigen::Vector2d::Zero();
-  // The one alone that explains more.
-  const Eigen::Vector2d gain = scoring.q.cwiseProduct(one);
-  (gain(0) >= gain(1) ? one(1) : one(0)) = 0;
-  return one;
+// The variances from a scoring at those of now; halfway on a logarithmic scale, which keeps them from
+// swinging.
+Eigen::Vector2d variances_of(Scoring scoring, const Eigen::Vector2d& now) {
+  const Eigen::Vector2d weight = now.array().square().inverse();
+  const double common = std::sqrt(now(0) * now(1));
+  scoring.F.diagonal() += (errors_of_one_factor + errors_of_usual_noise) * weight;
+  scoring.q += (errors_of_one_factor * common + errors_of_usual_noise) * weight;
+  const Eigen::Vector2d next = (scoring.F.inverse() * scoring.q).cwiseMax(least_variance);
+  return next.allFinite() ? Eigen::Vector2d(next.cwiseProduct(now).cwiseSqrt()) : now;
 }
 
 // True: settled.
 bool update_noise(const Terms& terms, const Matrix12& inverse, Noise& noise) {
   const double mm = usual_robot_mm, rad = usual_robot_deg / degrees_per_radian;
   const Eigen::Vector2d before(noise.mm * noise.mm / (mm * mm), noise.rad * noise.rad / (rad * rad));
-  const Eigen::Vector2d after =
-      variances_of(scoring_of(terms, noise, inverse), std::max(1e-2, before.mean()));
+  const Eigen::Vector2d after = variances_of(scoring_of(terms, noise, inverse), before);
   noise.mm = mm * std::sqrt(after(0));
   noise.rad = rad * std::sqrt(after(1));
-  return (after - before).cwiseAbs().maxCoeff() <= small_change * (1e-3 + before.maxCoeff());
+  return ((after - before).array().abs() <= small_change * before.array()).all();
 }
 
 // How many errors have shown the covariances: those that show the robot's noise, and more as far as the
