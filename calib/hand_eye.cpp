@@ -15,7 +15,7 @@ using namespace hand_eye;
 // A robot whose poses are worse has no calibration.
 constexpr double plausible_mm = 5, plausible_deg = 1;
 // A board's scale that is wrong by more is said, where it is sure.
-constexpr double notable_scale = 0.002, sure_sigmas = 4;
+constexpr double notable_scale = 0.002, sure_sigmas = 3;
 // Below, the noise of pixels is none that a camera has.
 constexpr double least_sigma_px = 1e-3;
 const std::string open_camera = "the camera's place";

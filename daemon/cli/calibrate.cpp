@@ -13,6 +13,9 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   add_calibrate_views(*verb, exit_status);
   add_calibrate_vanishing(*verb, exit_status);
   add_calibrate_pose(*verb, exit_status);
+  add_calibrate_tool(*verb, exit_status);
+  add_calibrate_ball(*verb, exit_status);
+  add_calibrate_hand_eye(*verb, exit_status);
 }
 
 }  // namespace zeropose

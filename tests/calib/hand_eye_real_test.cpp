@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <iostream>
-
 #include "calib/hand_eye_parts.h"
 #include "tests/support/csv.h"
 #include "tests/support/poses.h"
@@ -62,9 +60,11 @@ TEST(HandEyeRealData, BoardOnARobotsWrist) {
   ASSERT_EQ(result.status, HandEyeStatus::ok) << result.reason;
   // Peers: the board's place on the wrist scatters by up to 0.66 mm per axis.
   EXPECT_LT(scatter_of(views, result).maxCoeff(), 0.7);
-  // Against the peer's reprojection errors alone, which take the robot for perfect.
+  // OpenCV's PARK, which weighs all views alike; its own scatter leaves its mean open by about 0.2 mm per
+  // axis.
+  EXPECT_LT((result.X_FC.translation() - Eigen::Vector3d(-18.55, 1265.27, 288.84)).norm(), 1);
+  // The peer's reprojection errors alone take the robot for perfect: so weighted, this is the peer's result.
   const Eigen::Vector3d peer(-19.168, 1266.209, 287.428);
-  EXPECT_LT((result.X_FC.translation() - peer).norm(), 2.2);
   std::vector<hand_eye::SeenView> seen;
   for (std::size_t v = 0; v < views.size(); ++v) {
     HandEyeViewResult ignored;
@@ -76,9 +76,6 @@ TEST(HandEyeRealData, BoardOnARobotsWrist) {
   EXPECT_LT((alone.state.X_FC.translation() - peer).norm(), 0.1);
   EXPECT_NEAR(alone.scale, 1.00548, 3e-4);
   EXPECT_THAT(result.warnings, testing::Contains(testing::HasSubstr("% too small")));
-  std::cout << alone.state.X_FC.translation().transpose() << " scale " << alone.scale << " default "
-            << result.X_FC.translation().transpose() << " scale " << result.scale << " " << result.scale_sigma
-            << "\n";
 }
 
 }  // namespace
