@@ -148,12 +148,16 @@ WrongPoints judge_views(const HandEyeProblem& problem, const std::vector<SeenVie
   wrong = remove_wrong_points(std::move(wrong.fit), used, options);
   for (const std::size_t view : wrong.removed) result.removed.push_back(seen[view].index);
   for (const std::size_t view : wrong.suspects) result.suspects.push_back(seen[view].index);
+  // As before the last one was taken out.
+  std::vector<bool> before = used;
+  if (!wrong.removed.empty()) before[wrong.removed.back()] = true;
   if (!result.removed.empty() || !result.suspects.empty())
-    for (const std::size_t view : indispensable(seen))
+    for (const std::size_t view : indispensable(only_used(seen, before)))
       if (std::ranges::find(result.suspects, view) == result.suspects.end()) result.suspects.push_back(view);
-  // It is open which, so none is taken out for sure.
+  // It is open which, so those that were taken out are not wrong for sure either.
   if (!result.suspects.empty())
-    result.suspects.insert(result.suspects.begin(), result.removed.begin(), result.removed.end());
+    for (const std::size_t view : result.removed)
+      if (std::ranges::find(result.suspects, view) == result.suspects.end()) result.suspects.push_back(view);
   return wrong;
 }
 
@@ -237,8 +241,7 @@ void judge(const HandEyeProblem& problem, const WrongPoints& wrong, const std::v
   else
     result.reason +=
         ", and no single view explains it: look at the angles' convention, the tool frame of the robot's "
-        "poses and "
-        "the order of the views";
+        "poses and the order of the views";
 }
 
 }  // namespace
@@ -279,6 +282,7 @@ HandEyeResult calibrate_hand_eye(const HandEyeProblem& problem) {
   WrongPoints wrong = judge_views(problem, seen, std::move(fit), used, result);
   if (wrong.fit.status == PointFitStatus::ok) start = state_of(wrong.fit);
   const std::vector<SeenView> good = only_used(seen, used);
+  result.turns = turns_of(hand_poses(good));
   const Refined refined = refine(problem.model, problem.setup, good, start, expected, !robot_known(problem));
   fill_estimate(problem, refined, good.size(), result);
   fill_views(problem, seen, used, refined.state, result);

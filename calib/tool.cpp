@@ -59,12 +59,6 @@ ToolResult fault_of(const ToolProblem& problem) {
   return {};
 }
 
-std::vector<Pose> without(std::span<const Pose> poses, std::size_t touch) {
-  std::vector<Pose> rest(poses.begin(), poses.end());
-  rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(touch));
-  return rest;
-}
-
 std::string list_of(const std::vector<std::size_t>& touches) {
   std::string text;
   for (const std::size_t touch : touches) text += (text.empty() ? "" : ", ") + number(touch + 1);
@@ -85,35 +79,50 @@ std::string other_reading(std::span<const Pose> X_RH) {
   return reading == Reading::as_expected ? "" : "; the poses look like " + words_of(reading);
 }
 
-// Touches without which the others leave the tool open: no fit without them can tell whether they are wrong.
-std::vector<std::size_t> indispensable(std::span<const Pose> X_RH) {
+void add_once(std::vector<std::size_t>& touches, std::size_t touch) {
+  if (std::ranges::find(touches, touch) == touches.end()) touches.push_back(touch);
+}
+
+// Touches of those used without which the others leave the tool open: no fit without them can tell whether
+// they are wrong.
+std::vector<std::size_t> indispensable(std::span<const Pose> X_RH, std::vector<bool> used) {
   std::vector<std::size_t> touches;
-  for (std::size_t i = 0; i < X_RH.size(); ++i)
-    if (!turns_suffice(turns_of(without(X_RH, i)))) touches.push_back(i);
+  for (std::size_t i = 0; i < X_RH.size(); ++i) {
+    if (!used[i]) continue;
+    std::vector<Pose> others;
+    for (std::size_t k = 0; k < X_RH.size(); ++k)
+      if (used[k] && k != i) others.push_back(X_RH[k]);
+    if (!turns_suffice(turns_of(others))) touches.push_back(i);
+  }
   return touches;
 }
 
-void judge_agreement(const ToolProblem& problem, const WrongPoints& wrong, ToolResult& result) {
+std::vector<std::size_t> suspects_of(const ToolProblem& problem, const WrongPoints& wrong,
+                                     std::vector<bool> used) {
   std::vector<std::size_t> suspects = wrong.suspects;
-  const bool removed = !wrong.removed.empty();
-  if (removed || !suspects.empty())
-    for (const std::size_t touch : indispensable(problem.X_RH))
-      if (std::ranges::find(suspects, touch) == suspects.end()) suspects.push_back(touch);
-  // Together with those that were taken out before it was found that it is open.
-  const bool open = removed && !suspects.empty();
-  if (open) suspects.insert(suspects.begin(), wrong.removed.begin(), wrong.removed.end());
+  if (wrong.removed.empty() && suspects.empty()) return suspects;
+  if (!wrong.removed.empty()) used[wrong.removed.back()] = true;  // as before the last one was taken out
+  for (const std::size_t touch : indispensable(problem.X_RH, std::move(used))) add_once(suspects, touch);
+  // It is open which, so those that were taken out are not wrong for sure either.
+  if (!suspects.empty())
+    for (const std::size_t touch : wrong.removed) add_once(suspects, touch);
+  return suspects;
+}
+
+void judge_agreement(const ToolProblem& problem, const WrongPoints& wrong, const std::vector<bool>& used,
+                     ToolResult& result) {
+  result.suspects = suspects_of(problem, wrong, used);
   const bool plausible = result.rms_mm <= plausible_mm;
-  if (wrong.agree && !open && plausible) return;
+  if (wrong.agree && result.suspects.empty() && plausible) return;
   result.status = ToolStatus::contradiction;
   result.reason =
       "the touches contradict each other by " + number(result.rms_mm, 3) + " mm (root mean square)";
-  if (plausible && !suspects.empty())
+  if (plausible && !result.suspects.empty())
     result.reason +=
-        ", wrong is one of touches " + list_of(suspects) + " (from 1): repeat them, or add touches";
+        ", wrong is one of touches " + list_of(result.suspects) + " (from 1): repeat them, or add touches";
   else
     result.reason += ", and no single one explains it";
   result.reason += other_reading(problem.X_RH);
-  result.suspects = std::move(suspects);
 }
 
 void fill(const ToolProblem& problem, const WrongPoints& wrong, const std::vector<bool>& used,
@@ -198,7 +207,7 @@ ToolResult calibrate_tool(const ToolProblem& problem) {
   result.warnings = doubtful_units(problem.X_RH);
   if (std::string small = small_turns(turns); !small.empty()) result.warnings.push_back(std::move(small));
   warn_of_inverse(result);
-  judge_agreement(problem, wrong, result);
+  judge_agreement(problem, wrong, used, result);
   return result;
 }
 
