@@ -19,7 +19,6 @@ using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using testing::Not;
 using testing::UnorderedElementsAre;
 
 constexpr HandEyeSetup setups[] = {HandEyeSetup::eye_in_hand, HandEyeSetup::eye_to_hand};
@@ -189,6 +188,27 @@ TEST(HandEye, ARobotThatDidNotStandStillIsNamed) {
       EXPECT_GT(result.views[3].error_mm, 2);
       EXPECT_LT(test::distance_mm(result.X_FC, scene.X_FC), 1);
     }
+}
+
+// Without the only view that is turned about another axis nothing tells whether it is wrong.
+TEST(HandEye, AViewThatAloneGivesTheTurnIsNotCleared) {
+  Random random(15);
+  RobotScene scene = robot_scene(HandEyeSetup::eye_to_hand, 6, 30, random);
+  // Turns of the board before the camera are turns of the hand about an axis of its own.
+  const Pose X_CB = scene.X_FC.inverse() * scene.X_RH[0] * scene.X_GB;
+  for (std::size_t v = 0; v < scene.X_RH.size(); ++v) {
+    Pose turned = X_CB;
+    turned.linear() = X_CB.linear() * exp_so3((v == 5 ? 0.4 : 0.12 * static_cast<double>(v)) *
+                                              (v == 5 ? Vector3d::UnitX() : Vector3d::UnitZ()));
+    turned.translation() += Vector3d(5.0 * static_cast<double>(v), -3.0 * static_cast<double>(v % 3), 20);
+    scene.X_RH[v] = scene.X_FC * turned * scene.X_GB.inverse();
+  }
+  auto views = scene.views({0.02, 0.01, 0.002}, random);
+  ASSERT_EQ(solve(scene, views).status, HandEyeStatus::ok) << solve(scene, views).reason;
+  views[5].X_RH.translation() += Vector3d(9, 9, 9);
+  const HandEyeResult result = solve(scene, views);
+  ASSERT_EQ(result.status, HandEyeStatus::contradiction);
+  EXPECT_THAT(result.suspects, Contains(5u));
 }
 
 TEST(HandEye, WithThreeViewsNobodyKnowsWhichIsWrong) {
