@@ -14,6 +14,9 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   add_calibrate_vanishing(*verb, exit_status);
   add_calibrate_pose(*verb, exit_status);
   add_calibrate_survey(*verb, exit_status);
+  add_calibrate_tool(*verb, exit_status);
+  add_calibrate_ball(*verb, exit_status);
+  add_calibrate_hand_eye(*verb, exit_status);
 }
 
 }  // namespace zeropose

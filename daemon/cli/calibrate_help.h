@@ -18,6 +18,8 @@ search, then the refinement, then points that do not fit are thrown out.
   Accurate guidance              points with depth over the whole image, all of the above: calibrate points
   Several boards or cameras      calibrate views
   Internals known, camera put up calibrate pose
+  A robot in place of a board    calibrate tool, then calibrate ball
+  A camera on or before a robot  calibrate hand-eye: a board seen at several poses of the hand
   A quick look                   a rectangle on the wall from four sides: calibrate vanishing
 Every result comes with standard deviations, a verdict in words and, with --report, a page with the plots:
 docs/calibration.md says how to read it. Nothing is activated by calibrating.

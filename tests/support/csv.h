@@ -19,6 +19,7 @@ class CsvTable {
     std::ifstream file(std::filesystem::path(ZEROPOSE_SOURCE_DIR) / path);
     if (!file) throw std::runtime_error("cannot read " + path);
     for (std::string line; std::getline(file, line);) {
+      if (line.ends_with('\r')) line.pop_back();
       if (line.empty() || line.front() == '#') continue;
       (columns_.empty() ? columns_ : rows_.emplace_back()) = split(line);
     }
