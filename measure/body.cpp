@@ -19,6 +19,8 @@ using Eigen::Vector3d;
 constexpr double largest_share = 1.0 / 6;  // of the image's diagonal, that a mark may take
 constexpr double most_next = 0.75;         // of the best numbering's discs, that another may explain
 constexpr std::size_t least_lead = 4, least_marks = 8;
+// A reading beyond these is held against those of the table mirrored or seen from behind.
+constexpr double suspicious_px = 0.3, unsuspicious_share = 0.75;
 constexpr double clearly_better = 0.5;  // of the rms, that the mirrored table leaves
 
 bool is_clear(const Numberings& found) {
@@ -53,15 +55,20 @@ std::string wrong_with(const BodyProblem& problem) {
 }
 
 std::vector<RoughInternals> guesses_of(const ImageView& image, const BodyProblem& problem) {
-  if (problem.camera) return {{*problem.camera, 0.1, 10, 0.02}};
-  CameraModel model{image.width_px, image.height_px, problem.focal_px, problem.focal_px,
-                    0.5 * (image.width_px - 1), 0.5 * (image.height_px - 1), Division{}};
+  if (problem.camera) return {{*problem.camera, 0.1, 0.002, 10, 0.02}};
+  CameraModel model{image.width_px,
+                    image.height_px,
+                    problem.focal_px,
+                    problem.focal_px,
+                    0.5 * (image.width_px - 1),
+                    0.5 * (image.height_px - 1),
+                    Division{}};
   const double sigma_origin_px = 0.05 * image.width_px;
-  if (problem.focal_px > 0) return {{model, 0.2, sigma_origin_px, 0.05}};
+  if (problem.focal_px > 0) return {{model, 0.2, 0.02, sigma_origin_px, 0.05}};
   std::vector<RoughInternals> guesses;
   for (const double widths : {1.2, 2.5, 5.5}) {
     model.fx_px = model.fy_px = widths * image.width_px;
-    guesses.push_back({model, 0.5, sigma_origin_px, 0.05});
+    guesses.push_back({model, 0.5, 0.02, sigma_origin_px, 0.05});
   }
   return guesses;
 }
@@ -79,8 +86,8 @@ Reading read(const ImageView& image, const BodyProblem& problem, const BodyLayou
   search.bright = !dark;
   search.expected_px = search.half_window_px = 0.5 * Vector2d(image.width_px - 1, image.height_px - 1);
   search.min_diameter_px = problem.min_diameter_px;
-  search.max_diameter_px = std::max(problem.min_diameter_px + 1,
-                                    largest_share * std::hypot(image.width_px, image.height_px));
+  search.max_diameter_px =
+      std::max(problem.min_diameter_px + 1, largest_share * std::hypot(image.width_px, image.height_px));
   search.min_axis_ratio = problem.min_axis_ratio;
   search.min_contrast = problem.min_contrast;
   Reading reading;
@@ -129,17 +136,20 @@ double rms_when_mirrored(const ImageView& image, const BodyProblem& problem, con
   }
   const Vector3d sight = middle_C.normalized();
   const Matrix3d flip = Matrix3d::Identity() - 2 * sight * sight.transpose();
-  RoughCamera start = best.camera;
-  start.X_CB.linear() = flip * best.camera.X_CB.linear() * M;
-  start.X_CB.translation() = flip * (best.camera.X_CB.translation() - middle_C) + middle_C;
   double least = std::numeric_limits<double>::infinity();
   for (const RoughInternals& guess : guesses_of(image, problem)) {
+    // As large in the image as before.
+    const Vector3d middle = middle_C * (guess.model.fx_px / best.camera.model.fx_px);
+    RoughCamera start{guess.model, Pose::Identity(), 0};
+    start.X_CB.linear() = flip * best.camera.X_CB.linear() * M;
+    start.X_CB.translation() = middle + flip * (best.camera.X_CB.translation() - middle_C);
     const auto camera = fit_rough_camera(guess, start, pairs, std::max(1.0, best.rms_px));
     if (!camera) continue;
     double sum = 0;
     for (const BodyPair& pair : pairs)
-      sum += (project(camera->model, camera->X_CB * pair.p_B_mm).value_or(Vector2d::Constant(1e6)) - pair.u_px)
-                 .squaredNorm();
+      sum +=
+          (project(camera->model, camera->X_CB * pair.p_B_mm).value_or(Vector2d::Constant(1e6)) - pair.u_px)
+              .squaredNorm();
     least = std::min(least, std::sqrt(sum / double(pairs.size())));
   }
   return least;
@@ -152,30 +162,32 @@ std::string counts(const Reading& reading) {
   return number(reading.found.best.count) + " of " + number(reading.discs.size()) + " round things";
 }
 
-// Why there is no numbering that counts, or it does not.
-BodyResult explained(const ImageView& image, const BodyProblem& problem, const Reading& reading) {
-  const auto wins = [&](const Numberings& other) {
-    return is_clear(other) && other.best.count >= least_marks &&
-           other.best.count >= reading.found.best.count + least_lead;
-  };
+// What else the table could have been meant to be, where that explains clearly more; failed: nothing.
+BodyResult wrong_table(const ImageView& image, const BodyProblem& problem, const Reading& reading) {
+  const std::size_t best = reading.found.best.count;
   const Numberings mirrored =
       numbered_with(image, problem, reading, changed(problem.marks, swapped_axes(), 1));
-  if (wins(mirrored))
-    return refusal(BodyStatus::mirrored, std::string(mirrored_advice) + ": mirrored back it explains " +
-                                             number(mirrored.best.count) + " of " +
-                                             number(reading.discs.size()) + " round things, as it is " +
-                                             number(reading.found.best.count));
   const bool has_normals = std::any_of(problem.marks.begin(), problem.marks.end(),
                                        [](const BodyMark& mark) { return !mark.normal_B.isZero(); });
-  if (has_normals) {
-    const Numberings behind =
-        numbered_with(image, problem, reading, changed(problem.marks, Matrix3d::Identity(), -1));
-    if (wins(behind))
-      return refusal(BodyStatus::from_behind,
-                     "the normals nx ny nz point away from the camera: with the other sign " +
-                         number(behind.best.count) + " marks are seen, as they are " +
-                         number(reading.found.best.count));
-  }
+  Numberings behind;
+  if (has_normals)
+    behind = numbered_with(image, problem, reading, changed(problem.marks, Matrix3d::Identity(), -1));
+  const Numberings& other = behind.best.count >= mirrored.best.count ? behind : mirrored;
+  const std::string numbers = number(other.best.count) + " of " + number(reading.discs.size()) +
+                              " round things, as it is " + number(best);
+  if (!is_clear(other) || other.best.count < std::max(least_marks, best + least_lead)) return {};
+  if (&other == &behind)
+    return refusal(
+        BodyStatus::from_behind,
+        "the normals nx ny nz point away from the camera: with the other sign the table explains " + numbers);
+  return refusal(BodyStatus::mirrored,
+                 std::string(mirrored_advice) + ": mirrored back it explains " + numbers);
+}
+
+// Why there is no numbering that counts, or it does not.
+BodyResult explained(const ImageView& image, const BodyProblem& problem, const Reading& reading) {
+  BodyResult wrong = wrong_table(image, problem, reading);
+  if (wrong.status != BodyStatus::failed) return wrong;
   const std::size_t best = reading.found.best.count, next = reading.found.next_best;
   if (best >= least_marks && !is_clear(reading.found))
     return refusal(BodyStatus::ambiguous, "the best numbering explains " + counts(reading) +
@@ -185,13 +197,12 @@ BodyResult explained(const ImageView& image, const BodyProblem& problem, const R
     return refusal(BodyStatus::too_few, "found " + number(best) + " of " + number(problem.marks.size()) +
                                             " marks, at least " + number(100 * problem.least_share, 0) +
                                             " % are needed");
-  return refusal(BodyStatus::no_numbering,
-                 "no numbering explains more than " + number(best) + " of " + number(reading.discs.size()) +
-                     " round things, at least " + number(least_marks) + " of " +
-                     number(problem.marks.size()) +
-                     " marks are needed: is it this body, are the marks at least " +
-                     number(problem.min_diameter_px, 0) +
-                     " px wide, and is the focal length right within 20 %?");
+  return refusal(BodyStatus::no_numbering, "no numbering explains more than " + number(best) + " of " +
+                                               number(reading.discs.size()) + " round things, at least " +
+                                               number(least_marks) + " of " + number(problem.marks.size()) +
+                                               " marks are needed: is it this body, are the marks at least " +
+                                               number(problem.min_diameter_px, 0) +
+                                               " px wide, and is the focal length right within 20 %?");
 }
 
 BodyPoint point_of(const BodyProblem& problem, const BodyLayout& layout, const Reading& reading,
@@ -199,8 +210,8 @@ BodyPoint point_of(const BodyProblem& problem, const BodyLayout& layout, const R
   const Numbering& best = reading.found.best;
   const MarkFinding& disc = reading.findings[best.disc_of[mark]];
   const Vector3d p_C = best.camera.X_CB * problem.marks[mark].p_B_mm;
-  BodyPoint point{mark, disc.u_px, disc.covariance_px2, disc.diameter_px, Vector2d::Zero(),
-                  layout.normals_B[mark]};
+  BodyPoint point{
+      mark, disc.u_px, disc.covariance_px2, disc.diameter_px, Vector2d::Zero(), layout.normals_B[mark]};
   if ((best.camera.X_CB.linear() * point.normal_B).dot(p_C) > 0) point.normal_B = -point.normal_B;
   point.dev_px = disc.u_px - project(best.camera.model, p_C).value_or(disc.u_px);
   return point;
@@ -226,6 +237,10 @@ BodyResult judged(const ImageView& image, const BodyProblem& problem, const Body
   const Numbering& best = reading.found.best;
   const double least = std::max(double(least_marks), problem.least_share * double(problem.marks.size()));
   if (double(best.count) < least || !is_clear(reading.found)) return explained(image, problem, reading);
+  if (best.rms_px > suspicious_px || double(best.count) < unsuspicious_share * double(problem.marks.size())) {
+    BodyResult wrong = wrong_table(image, problem, reading);
+    if (wrong.status != BodyStatus::failed) return wrong;
+  }
   const double mirrored_px = rms_when_mirrored(image, problem, reading);
   if (mirrored_px < clearly_better * best.rms_px)
     return refusal(BodyStatus::mirrored, std::string(mirrored_advice) + ": as it is the marks deviate by " +

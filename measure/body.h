@@ -33,11 +33,11 @@ struct BodyProblem {
 };
 
 struct BodyPoint {
-  std::size_t mark = 0;                             // index into the marks
-  Eigen::Vector2d u_px = Eigen::Vector2d::Zero();   // centre of its image, not the image of its centre
+  std::size_t mark = 0;                            // index into the marks
+  Eigen::Vector2d u_px = Eigen::Vector2d::Zero();  // centre of its image, not the image of its centre
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
-  double diameter_px = 0;                           // longer axis
-  Eigen::Vector2d dev_px = Eigen::Vector2d::Zero();  // found - where the rough camera expects it
+  double diameter_px = 0;                              // longer axis
+  Eigen::Vector2d dev_px = Eigen::Vector2d::Zero();    // found - where the rough camera expects it
   Eigen::Vector3d normal_B = Eigen::Vector3d::Zero();  // unit, towards the camera
 };
 
@@ -49,8 +49,8 @@ enum class BodyStatus {
   no_layout,     // the table has no plane with rows and columns
   no_numbering,  // no reading explains more than a few discs
   too_few,
-  ambiguous,  // another numbering explains about as many discs
-  mirrored,   // the table's coordinates are left-handed
+  ambiguous,   // another numbering explains about as many discs
+  mirrored,    // the table's coordinates are left-handed
   from_behind  // the marks' normals point away from the camera
 };
 std::string_view name_of(BodyStatus status);

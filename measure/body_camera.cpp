@@ -14,10 +14,12 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr int unknowns = 10;  // pose 6, log focal, cx, cy, bend
+constexpr int unknowns = 11;  // pose 6, log focal, cx, cy, bend, log aspect
 using Delta = Eigen::Matrix<double, unknowns, 1>;
+using Beliefs = Eigen::Matrix<double, 5, 1>;
 using Normal = Eigen::Matrix<double, unknowns, unknowns>;
 constexpr int most_rounds = 40;
+constexpr double model_px = 0.2;     // what the rough model leaves: the weight of what was believed before
 constexpr double small_gain = 1e-6;  // relative
 
 // The angle of the image's corner, for what a bend means.
@@ -33,7 +35,7 @@ double bend_of(const CameraModel& model) {
 CameraModel changed(CameraModel model, const Delta& delta) {
   const double bend = bend_of(model) + delta(9);
   model.fx_px *= std::exp(delta(6));
-  model.fy_px *= std::exp(delta(6));
+  model.fy_px *= std::exp(delta(6) + delta(10));
   model.cx_px += delta(7);
   model.cy_px += delta(8);
   if (auto* lens = std::get_if<Division>(&model.distortion))
@@ -45,9 +47,9 @@ class Fit {
  public:
   Fit(const RoughInternals& before, std::span<const BodyPair> pairs, double scale_px)
       : before_(before), pairs_(pairs), scale2_(scale_px * scale_px) {
-    sigmas_.setConstant(0);
-    sigmas_.tail<4>() << before.sigma_focal, before.sigma_origin_px, before.sigma_origin_px,
-        before.sigma_bend;
+    sigmas_ << before.sigma_focal, before.sigma_origin_px, before.sigma_origin_px, before.sigma_bend,
+        before.sigma_aspect;
+    sigmas_ /= model_px;
   }
 
   // Infinite where a point has no image.
@@ -58,27 +60,28 @@ class Fit {
       if (!u_px) return std::numeric_limits<double>::infinity();
       sum += scale2_ * std::log1p((pair.u_px - *u_px).squaredNorm() / scale2_);
     }
-    const Eigen::Vector4d off = beside(at.model);
-    return sum + off.cwiseQuotient(sigmas_.tail<4>()).squaredNorm();
+    return sum + beside(at.model).cwiseQuotient(sigmas_).squaredNorm();
   }
 
   void equations(const RoughCamera& at, Normal& N, Delta& g) const {
     N.setZero();
     g.setZero();
     for (const BodyPair& pair : pairs_) add(at, pair, N, g);
-    const Eigen::Vector4d off = beside(at.model);
-    for (int k = 0; k < 4; ++k) {
-      const double weight = 1 / (sigmas_(6 + k) * sigmas_(6 + k));
+    const Beliefs off = beside(at.model);
+    for (int k = 0; k < off.size(); ++k) {
+      const double weight = 1 / (sigmas_(k) * sigmas_(k));
       N(6 + k, 6 + k) += weight;
       g(6 + k) -= weight * off(k);
     }
   }
 
  private:
-  // From what was believed before: log focal, origin, bend.
-  Eigen::Vector4d beside(const CameraModel& model) const {
-    return {std::log(model.fx_px / before_.model.fx_px), model.cx_px - before_.model.cx_px,
-            model.cy_px - before_.model.cy_px, bend_of(model) - bend_of(before_.model)};
+  // From what was believed before: log focal, origin, bend, log aspect.
+  Beliefs beside(const CameraModel& model) const {
+    const double focal = std::log(model.fx_px / before_.model.fx_px);
+    return (Beliefs() << focal, model.cx_px - before_.model.cx_px, model.cy_px - before_.model.cy_px,
+            bend_of(model) - bend_of(before_.model), std::log(model.fy_px / before_.model.fy_px) - focal)
+        .finished();
   }
   void add(const RoughCamera& at, const BodyPair& pair, Normal& N, Delta& g) const {
     const Vector3d turned = at.X_CB.linear() * pair.p_B_mm, p_C = turned + at.X_CB.translation();
@@ -88,6 +91,7 @@ class Fit {
     J.leftCols<3>() = seen->du_dp;
     J.middleCols<3>(3) = -seen->du_dp * cross_matrix(turned);
     J.col(6) = at.model.fx_px * seen->du_di.col(0) + at.model.fy_px * seen->du_di.col(1);
+    J.col(10) = at.model.fy_px * seen->du_di.col(1);
     J.middleCols<2>(7) = seen->du_di.middleCols<2>(2);
     J.col(9).setZero();
     if (std::holds_alternative<Division>(at.model.distortion)) {
@@ -105,7 +109,7 @@ class Fit {
   const RoughInternals& before_;
   std::span<const BodyPair> pairs_;
   double scale2_;
-  Delta sigmas_;
+  Beliefs sigmas_;
 };
 
 RoughCamera stepped(const RoughCamera& at, const Delta& delta) {
@@ -118,8 +122,9 @@ RoughCamera stepped(const RoughCamera& at, const Delta& delta) {
 // axes are theirs without depth, times one scale.
 std::array<Pose, 2> poses_of_plane(const CameraModel& model, const Vector3d& p_B_mm, const Matrix3d& axes_B,
                                    const Vector2d& u_px, const Matrix2d& stretch) {
-  const Vector3d d = ray(model, u_px).value_or(
-      Vector3d((u_px.x() - model.cx_px) / model.fx_px, (u_px.y() - model.cy_px) / model.fy_px, 1));
+  const Vector3d d = ray(model, u_px)
+                         .value_or(Vector3d((u_px.x() - model.cx_px) / model.fx_px,
+                                            (u_px.y() - model.cy_px) / model.fy_px, 1));
   Matrix3d R_CD;
   R_CD.col(2) = d.normalized();
   R_CD.col(0) = Vector3d::UnitY().cross(R_CD.col(2)).normalized();
@@ -127,8 +132,7 @@ std::array<Pose, 2> poses_of_plane(const CameraModel& model, const Vector3d& p_B
   Eigen::Matrix<double, 2, 3> from_point;
   from_point << 1, 0, -d.x(), 0, 1, -d.y();
   const Matrix2d across = from_point * R_CD.leftCols<2>();
-  const Matrix2d B =
-      across.inverse() * Vector2d(1 / model.fx_px, 1 / model.fy_px).asDiagonal() * stretch;
+  const Matrix2d B = across.inverse() * Vector2d(1 / model.fx_px, 1 / model.fy_px).asDiagonal() * stretch;
   const Matrix2d S = B.transpose() * B;
   const double mean = 0.5 * S.trace(), spread = std::hypot(0.5 * (S(0, 0) - S(1, 1)), S(0, 1));
   const double scale2 = mean + spread;  // 1 / depth^2

@@ -20,9 +20,10 @@ struct BodyPair {
 // What is believed of the internals before, and how firmly.
 struct RoughInternals {
   CameraModel model;
-  double sigma_focal = 0.2;       // of the focal length's logarithm; fx / fy is held
-  double sigma_origin_px = 20;    // of cx and cy
-  double sigma_bend = 0.05;       // what the lens does at the image's corner, relative; division model only
+  double sigma_focal = 0.2;     // of the focal length's logarithm
+  double sigma_aspect = 0.02;   // of the logarithm of fy / fx
+  double sigma_origin_px = 20;  // of cx and cy
+  double sigma_bend = 0.05;     // what the lens does at the image's corner, relative; division model only
 };
 
 struct RoughCamera {
@@ -37,7 +38,7 @@ std::array<Pose, 2> poses_of_plane(const CameraModel& model, const Eigen::Vector
                                    const Eigen::Matrix3d& axes_B, const Eigen::Vector2d& u_px,
                                    const Eigen::Matrix2d& stretch);
 
-// Maximum a posteriori of pose, focal length, origin and lens, with Cauchy's loss from scale_px on. Nothing
+// Maximum a posteriori of pose, focal lengths, origin and lens, with Cauchy's loss from scale_px on. Nothing
 // where it does not converge in front of the camera.
 std::optional<RoughCamera> fit_rough_camera(const RoughInternals& before, const RoughCamera& start,
                                             std::span<const BodyPair> pairs, double scale_px);

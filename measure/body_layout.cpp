@@ -17,12 +17,13 @@ using Eigen::Matrix3d;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double off_plane = 0.05;        // of the spacing
-constexpr double least_across = 0.3;      // of the spacing: three marks that are less than a line
-constexpr std::size_t near_enough = 6;    // neighbours looked at
-constexpr double least_sine = 0.7;        // between the sides of a cell
-constexpr double longest_side = 2.2;      // of the shorter one
-constexpr double fourth_off = 0.25;       // of the shorter side: where the fourth corner may be
+constexpr double off_plane = 0.05;      // of the spacing
+constexpr double least_across = 0.3;    // of the spacing: three marks that are less than a line
+constexpr std::size_t near_enough = 6;  // neighbours looked at
+constexpr double least_sine = 0.7;      // between the sides of a cell
+constexpr double longest_side = 2.2;    // of the shorter one
+constexpr double fourth_off = 0.25;     // of the shorter side: where the fourth corner may be
+constexpr double inside = 0.1;          // of the sides: what still counts as in the cell
 
 double median(std::vector<double> values) {
   if (values.empty()) return 0;
@@ -141,6 +142,18 @@ std::size_t fourth_of(const std::vector<Near>& near, const Near& a, const Near& 
   return best;
 }
 
+// Another point in the parallelogram: its sides are not those between neighbours.
+bool is_empty(const std::vector<Near>& near, const Near& a, const Near& b, std::size_t across) {
+  Matrix2d sides;
+  sides << a.offset, b.offset;
+  const Matrix2d back = sides.inverse();
+  return std::none_of(near.begin(), near.end(), [&](const Near& other) {
+    if (other.point == a.point || other.point == b.point || other.point == across) return false;
+    const Vector2d at = back * other.offset;
+    return at.minCoeff() > -inside && at.maxCoeff() < 1 + inside;
+  });
+}
+
 }  // namespace
 
 std::vector<Cell> cells_of(std::span<const Vector2d> points, std::span<const Matrix2d> metric) {
@@ -158,7 +171,9 @@ std::vector<Cell> cells_of(std::span<const Vector2d> points, std::span<const Mat
                 longest_side * std::min(first.distance, second.distance))
           continue;
         const std::size_t across = fourth_of(near, first, second, points.size());
-        if (across == points.size() || across == first.point || across == second.point) continue;
+        if (across == points.size() || across == first.point || across == second.point ||
+            !is_empty(near, first, second, across))
+          continue;
         const Cell cell{i, first.point, across, second.point};
         Cell sorted = cell;
         std::sort(sorted.begin(), sorted.end());

@@ -16,10 +16,10 @@ using Cell = std::array<std::size_t, 4>;
 
 struct BodyPlane {
   std::vector<std::size_t> marks;
-  std::vector<Eigen::Vector2d> places;               // of the marks in the plane, mm
+  std::vector<Eigen::Vector2d> places;  // of the marks in the plane, mm
   Eigen::Vector3d origin_B = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes_B = Eigen::Matrix3d::Identity();  // columns: the plane's x, y and normal
-  std::vector<Cell> cells;                           // into `marks`, turning from x to y
+  std::vector<Cell> cells;                               // into `marks`, turning from x to y
 };
 
 struct BodyLayout {
@@ -32,8 +32,8 @@ struct BodyLayout {
 // three neighbours. Normals that are given win over those of the layout, whose sign is open.
 BodyLayout layout_of(std::span<const BodyMark> marks);
 
-// All parallelograms of neighbours among points, each once, turning from x to y. metric: per point, turns
-// offsets into lengths that can be compared in all directions.
+// All parallelograms of neighbours among points with no other point in them, each once, turning from x to y.
+// metric: per point, turns offsets into lengths that can be compared in all directions.
 std::vector<Cell> cells_of(std::span<const Eigen::Vector2d> points, std::span<const Eigen::Matrix2d> metric);
 
 }  // namespace zeropose

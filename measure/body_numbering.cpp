@@ -16,11 +16,13 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr std::size_t most_matches = 200, most_grown = 40;  // readings that are followed
-constexpr double loose = 0.3;        // of the spacing: how far from its place a disc may be at first
-constexpr double reach = 2.5;        // of the spacing: what is next to the marks that are matched
+constexpr double loose = 0.3;  // of the spacing: how far from its place a disc may be at first
+constexpr double reach = 2.5;  // of the spacing: what is next to the marks that are matched
 constexpr int most_rounds = 15;
 constexpr double least_limit_px = 0.5, limit_by_median = 6, limit_share = 0.0025;  // of the diagonal
-constexpr double other_share = 0.2;  // of the discs: so many with other numbers make another numbering
+constexpr double off_table = 0.02;  // of the spacing: how far marks may be off the places of a nominal table
+constexpr double most_off_focal = 3;  // sigmas
+constexpr double other_share = 0.2;   // of the discs: so many with other numbers make another numbering
 
 struct Expected {
   Vector2d u_px;
@@ -46,6 +48,9 @@ class Grower {
   // How many discs lie about where the marks are expected.
   std::size_t promise(const Numbering& numbering) const { return matched(numbering, loose, 0, true).count; }
   std::optional<Numbering> grow(Numbering numbering) const;
+  double limit_px(const Numbering& numbering) const;
+  double judging_limit_px(const Numbering& best) const;
+  std::size_t count_within(const Numbering& numbering, double limit_px) const;
   void set_radius2(double radius2_mm2) { radius2_mm2_ = radius2_mm2; }
 
  private:
@@ -56,7 +61,7 @@ class Grower {
   // Discs nearest to where the marks are expected; most_px 0: no limit in px.
   Numbering matched(const Numbering& before, double most_off, double most_px, bool everywhere) const;
   bool refit(Numbering& numbering) const;
-  double median_px(const Numbering& numbering) const;
+  std::vector<double> lengths_px(const Numbering& numbering) const;
 
   std::span<const LatticeDisc> discs_;
   std::span<const BodyMark> marks_;
@@ -83,8 +88,7 @@ std::optional<Expected> Grower::expected(const RoughCamera& camera, std::size_t 
 bool Grower::is_near(std::size_t mark, const Numbering& numbering) const {
   const double within = reach * layout_.spacing_mm[mark];
   for (std::size_t other = 0; other < marks_.size(); ++other)
-    if (numbering.disc_of[other] != no_disc &&
-        (marks_[other].p_B_mm - marks_[mark].p_B_mm).norm() < within)
+    if (numbering.disc_of[other] != no_disc && (marks_[other].p_B_mm - marks_[mark].p_B_mm).norm() < within)
       return true;
   return false;
 }
@@ -132,7 +136,9 @@ bool Grower::refit(Numbering& numbering) const {
       pairs.push_back({marks_[mark].p_B_mm, discs_[numbering.disc_of[mark]].u_px});
   if (pairs.size() < 4) return false;
   const auto camera = fit_rough_camera(before_, numbering.camera, pairs, largest_px_);
-  if (!camera) return false;
+  if (!camera ||
+      std::abs(std::log(camera->model.fx_px / before_.model.fx_px)) > most_off_focal * before_.sigma_focal)
+    return false;
   numbering.camera = *camera;
   double sum = 0;
   for (const BodyPair& pair : pairs) {
@@ -144,25 +150,47 @@ bool Grower::refit(Numbering& numbering) const {
   return true;
 }
 
-double Grower::median_px(const Numbering& numbering) const {
+std::vector<double> Grower::lengths_px(const Numbering& numbering) const {
   std::vector<double> lengths;
   for (std::size_t mark = 0; mark < marks_.size(); ++mark) {
     if (numbering.disc_of[mark] == no_disc) continue;
     const auto u_px = project(numbering.camera.model, numbering.camera.X_CB * marks_[mark].p_B_mm);
     if (u_px) lengths.push_back((discs_[numbering.disc_of[mark]].u_px - *u_px).norm());
   }
-  if (lengths.empty()) return 0;
+  return lengths;
+}
+
+// How far a disc may be from where it is expected, by how far the others are.
+double Grower::limit_px(const Numbering& numbering) const {
+  std::vector<double> lengths = lengths_px(numbering);
+  if (lengths.empty()) return least_limit_px;
   const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
-  return *middle;
+  return std::clamp(limit_by_median * *middle, least_limit_px, largest_px_);
+}
+
+// A table may be nominal: what another reading leaves must be more than marks may be off their places.
+double Grower::judging_limit_px(const Numbering& best) const {
+  double sum = 0;
+  for (std::size_t mark = 0; mark < marks_.size(); ++mark) {
+    if (best.disc_of[mark] == no_disc) continue;
+    if (const auto at = expected(best.camera, mark))
+      sum += layout_.spacing_mm[mark] * std::sqrt(std::abs(at->stretch.determinant()));
+  }
+  return std::max(limit_px(best), off_table * sum / double(std::max<std::size_t>(1, best.count)));
+}
+
+std::size_t Grower::count_within(const Numbering& numbering, double limit_px) const {
+  const std::vector<double> lengths = lengths_px(numbering);
+  return static_cast<std::size_t>(
+      std::count_if(lengths.begin(), lengths.end(), [&](double length) { return length < limit_px; }));
 }
 
 std::optional<Numbering> Grower::begin(const PlaneMatch& match, const Pose& X_CB) const {
   Numbering numbering;
   numbering.disc_of.assign(marks_.size(), no_disc);
   const BodyPlane& plane = layout_.planes[match.plane];
-  for (std::size_t k = 0; k < match.disc_of.size(); ++k)
-    numbering.disc_of[plane.marks[k]] = match.disc_of[k];
+  for (std::size_t k = 0; k < match.disc_of.size(); ++k) numbering.disc_of[plane.marks[k]] = match.disc_of[k];
   numbering.count = match.count;
   numbering.camera = {before_.model, X_CB, 0};
   if (!refit(numbering)) return std::nullopt;
@@ -181,9 +209,7 @@ std::optional<Numbering> Grower::grow(Numbering numbering) const {
     numbering = std::move(next);
   }
   for (int round = 0; round < 3; ++round) {
-    const double limit_px =
-        std::clamp(limit_by_median * median_px(numbering), least_limit_px, largest_px_);
-    numbering = matched(numbering, loose, limit_px, true);
+    numbering = matched(numbering, loose, limit_px(numbering), true);
     if (!refit(numbering)) return std::nullopt;
   }
   return numbering;
@@ -250,8 +276,12 @@ Numberings number_discs(std::span<const LatticeDisc> discs, std::span<const Body
   Numberings result;
   if (grown.empty()) return result;
   result.best = grown.front();
+  // All by the limit of the best: a wrong reading that explains the discs roughly does not explain them.
+  const Grower judge(discs, marks, layout, before.front());
+  const double limit_px = judge.judging_limit_px(result.best);
   for (const Numbering& other : grown)
-    if (is_other(result.best, other)) result.next_best = std::max(result.next_best, other.count);
+    if (is_other(result.best, other))
+      result.next_best = std::max(result.next_best, judge.count_within(other, limit_px));
   return result;
 }
 

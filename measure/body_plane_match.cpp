@@ -154,9 +154,26 @@ bool Matcher::extend(const Matrix3d& H, PlaneMatch& match) const {
   return match.count > before.count;
 }
 
+// Where the four are by their affine map.
+Matrix3d affine_of(const PlaneMatch& match, const Vector2d& place, const Vector2d& u_px) {
+  Matrix3d A = Matrix3d::Identity();
+  A.topLeftCorner<2, 2>() = match.stretch;
+  A.topRightCorner<2, 1>() = u_px - match.stretch * place;
+  return A;
+}
+
 std::optional<PlaneMatch> Matcher::grow(const Cell& discs, const Cell& cell) const {
   PlaneMatch match;
   if (!begin(discs, cell, match)) return std::nullopt;
+  // The cheap map of the four decides whether it is worth while: most readings have no next mark.
+  PlaneMatch next = match;
+  Vector2d place = Vector2d::Zero(), u_px = Vector2d::Zero();
+  for (std::size_t k = 0; k < 4; ++k) {
+    place += plane_.places[cell[k]] / 4;
+    u_px += discs_[discs[k]].u_px / 4;
+  }
+  const Matrix3d affine = affine_of(match, place, u_px);
+  if (!extend(affine, next) && plane_.marks.size() > 4) return std::nullopt;
   std::optional<Matrix3d> H = map_of(match);
   for (int round = 0; round < most_rounds && H && extend(*H, match); ++round) H = map_of(match);
   if (!H) return std::nullopt;
