@@ -13,6 +13,7 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   add_calibrate_views(*verb, exit_status);
   add_calibrate_vanishing(*verb, exit_status);
   add_calibrate_pose(*verb, exit_status);
+  add_calibrate_body(*verb, exit_status);
 }
 
 }  // namespace zeropose

@@ -17,6 +17,7 @@ search, then the refinement, then points that do not fit are thrown out.
   A board on the desk            one plane: turn it (views), or accept what one plane cannot tell
   Accurate guidance              points with depth over the whole image, all of the above: calibrate points
   Several boards or cameras      calibrate views
+  A picture of a calibration body calibrate body
   Internals known, camera put up calibrate pose
   A quick look                   a rectangle on the wall from four sides: calibrate vanishing
 Every result comes with standard deviations, a verdict in words and, with --report, a page with the plots:

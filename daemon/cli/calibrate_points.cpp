@@ -1,3 +1,5 @@
+#include "daemon/cli/calibrate_points.h"
+
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -19,17 +21,6 @@ namespace zeropose {
 namespace {
 
 using namespace cli;
-
-struct PointsOptions {
-  std::string points, method = "auto", refine = "auto", residual = "reprojection", model, start, active, name;
-  std::string output, report, report_json, angles = "deg";
-  std::optional<std::string> origin;
-  std::optional<double> tz_mm;
-  std::vector<std::string> fix;
-  int width_px = 0, height_px = 0;
-  double reject_px = 0, reject_mm = 0, sigma_px = 0, robust = 0, pitch_mm = 0, frame_offset_z_mm = 0;
-  bool search_origin = false, one_focal = false, replace = false, json = false;
-};
 
 // What calibrate() borrows, and the files beside it.
 struct PointsInput {
@@ -81,10 +72,10 @@ void read_start(const PointsOptions& options, CalibrationProblem& problem) {
     throw std::invalid_argument("--width and --height are required (or --start, which states them)");
 }
 
-std::unique_ptr<PointsInput> input_of(const PointsOptions& options) {
+std::unique_ptr<PointsInput> input_of(const PointsOptions& options, std::vector<CalibrationPoint> points) {
   auto input = std::make_unique<PointsInput>();
   CalibrationProblem& problem = input->problem;
-  input->points = load_calibration_points(options.points);
+  input->points = std::move(points);
   problem.points = input->points;
   read_start(options, problem);
   if (!options.active.empty()) {
@@ -139,25 +130,7 @@ void write_files(const PointsOptions& options, const CalibrationReport& report, 
     write(options.output, camera_file_text({{options.name, report.result.model, report.result.X_WC}, true}));
 }
 
-Answer calibrate_points(const PointsOptions& options) {
-  refuse_contradictions(options);
-  const auto input = input_of(options);
-  const CalibrationResult result = calibrate(input->problem);
-  if (result.status != CalibrationStatus::ok) return calibration_failure(result);
-  const CalibrationReport report{
-      input->problem,   result,
-      options.name,     concat({"Points: ", std::filesystem::path(options.points).filename().string()}),
-      options.pitch_mm, options.frame_offset_z_mm,
-      input->active};
-  Answer answer;
-  answer.json = calibration_json(report);
-  answer.text = calibration_text(report, options.angles == "rad");
-  write_files(options, report, answer);
-  return answer;
-}
-
 void add_problem_options(CLI::App& verb, PointsOptions& options) {
-  verb.add_option("--points", options.points, "CSV: x_mm y_mm z_mm u_px v_px")->required();
   verb.add_option("--width", options.width_px, "of the image, px")->check(CLI::Range(1, 65535));
   verb.add_option("--height", options.height_px, "of the image, px")->check(CLI::Range(1, 65535));
   verb.add_option("--method", options.method, "the linear method that begins (auto)")
@@ -207,14 +180,47 @@ void add_answer_options(CLI::App& verb, PointsOptions& options) {
 
 }  // namespace
 
+namespace cli {
+
+void add_points_options(CLI::App& verb, PointsOptions& options) {
+  add_problem_options(verb, options);
+  add_answer_options(verb, options);
+}
+
+PointsAnswer calibrate_from(const PointsOptions& options, std::vector<CalibrationPoint> points,
+                            const std::string& source) {
+  refuse_contradictions(options);
+  const auto input = input_of(options, std::move(points));
+  PointsAnswer found{{}, calibrate(input->problem)};
+  if (found.result.status != CalibrationStatus::ok) {
+    found.answer = calibration_failure(found.result);
+    return found;
+  }
+  const CalibrationReport report{
+      input->problem, found.result, options.name, source, options.pitch_mm, options.frame_offset_z_mm,
+      input->active};
+  found.answer.json = calibration_json(report);
+  found.answer.text = calibration_text(report, options.angles == "rad");
+  write_files(options, report, found.answer);
+  return found;
+}
+
+}  // namespace cli
+
 void add_calibrate_points(CLI::App& calibrate, int& exit_status) {
   auto options = std::make_shared<PointsOptions>();
   CLI::App* verb = calibrate.add_subcommand("points", "One camera from known points and their pixels");
-  add_problem_options(*verb, *options);
-  add_answer_options(*verb, *options);
+  verb->add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px")->required();
+  add_points_options(*verb, *options);
   verb->footer(calibrate_points_help);
   verb->callback([options, &exit_status] {
-    exit_status = run([&] { return calibrate_points(*options); }, options->json);
+    const auto calibrate = [&] {
+      refuse_contradictions(*options);
+      return calibrate_from(*options, load_calibration_points(options->points),
+                            concat({"Points: ", std::filesystem::path(options->points).filename().string()}))
+          .answer;
+    };
+    exit_status = run(calibrate, options->json);
   });
 }
 
