@@ -20,7 +20,12 @@ constexpr double line_share = 1e-3;
 
 class FrameEquations : public PointEquations {
  public:
-  FrameEquations(std::span<const MeasuredPair> pairs, const Pose& X_AB) : pairs_(pairs), X_AB_(X_AB) {}
+  FrameEquations(std::span<const MeasuredPair> pairs, const Pose& X_AB) : pairs_(pairs), X_AB_(X_AB) {
+    // Turned once, by the pose to begin with: weights that moved with the estimate would not let it converge.
+    for (const MeasuredPair& pair : pairs)
+      whiten_.emplace_back(pair.covariance_A_mm2 +
+                           X_AB.linear() * pair.covariance_B_mm2 * X_AB.linear().transpose());
+  }
 
   std::unique_ptr<PointEquations> copy() const override { return std::make_unique<FrameEquations>(*this); }
   Eigen::Index unknowns() const override { return 6; }
@@ -29,13 +34,10 @@ class FrameEquations : public PointEquations {
   bool linearise(std::size_t point, PointRows& rows) const override {
     const MeasuredPair& pair = pairs_[point];
     const Vector3d turned = X_AB_.linear() * pair.p_B_mm;
-    const Matrix3d covariance =
-        pair.covariance_A_mm2 + X_AB_.linear() * pair.covariance_B_mm2 * X_AB_.linear().transpose();
-    const Eigen::LLT<Matrix3d> whiten(covariance);
     Eigen::Matrix<double, 3, 6> J;
     J << Matrix3d::Identity(), -cross_matrix(turned);
-    rows.r = whiten.matrixL().solve(Vector3d(pair.p_A_mm - turned - X_AB_.translation()));
-    rows.J = whiten.matrixL().solve(J);
+    rows.r = whiten_[point].matrixL().solve(Vector3d(pair.p_A_mm - turned - X_AB_.translation()));
+    rows.J = whiten_[point].matrixL().solve(J);
     return rows.r.allFinite();
   }
   void move(const Eigen::VectorXd& delta) override { X_AB_ = moved(X_AB_, delta); }
@@ -44,6 +46,7 @@ class FrameEquations : public PointEquations {
  private:
   std::span<const MeasuredPair> pairs_;
   Pose X_AB_;
+  std::vector<Eigen::LLT<Matrix3d>> whiten_;
 };
 
 FrameFitResult failed(FrameFitStatus status, std::string reason) {
@@ -145,6 +148,10 @@ FrameFitResult fit_frames(std::span<const MeasuredPair> pairs) {
     return failed(FrameFitStatus::collinear, "the points lie on a line in one of the frames");
   std::vector<bool> used(pairs.size(), true);
   PointFit all = fit_points(FrameEquations(pairs, start.X_AB), used);
+  if (all.status == PointFitStatus::ok) {
+    const Pose X_AB = static_cast<const FrameEquations&>(*all.at).X_AB();
+    all = fit_points(FrameEquations(pairs, X_AB), used);
+  }
   if (all.status != PointFitStatus::ok)
     return failed(FrameFitStatus::not_converged, "no pose explains the " + number(pairs.size()) + " points");
   WrongPointOptions options;

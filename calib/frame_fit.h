@@ -44,7 +44,7 @@ struct FrameFitResult {
   std::vector<std::size_t> suspects;  // contradiction: one of these
 };
 
-// Maximum likelihood: the covariances of B turn with the pose. A wrong point is taken out as in
+// Maximum likelihood, the covariances of B turned by the pose. A wrong point is taken out as in
 // remove_wrong_points(), which four points and more allow.
 FrameFitResult fit_frames(std::span<const MeasuredPair> pairs);
 

@@ -20,7 +20,7 @@ constexpr double loose = 0.3;  // of the spacing: how far from its place a disc 
 constexpr double reach = 2.5;  // of the spacing: what is next to the marks that are matched
 constexpr int most_rounds = 15;
 constexpr double least_limit_px = 0.5, limit_by_median = 6, limit_share = 0.0025;  // of the diagonal
-constexpr double off_table = 0.02;  // of the spacing: how far marks may be off the places of a nominal table
+constexpr double off_table = 0.01;  // of the spacing: how far marks may be off the places of a nominal table
 constexpr double most_off_focal = 3;  // sigmas
 constexpr double other_share = 0.2;   // of the discs: so many with other numbers make another numbering
 

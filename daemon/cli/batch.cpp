@@ -22,6 +22,7 @@
 #include "daemon/cli/plan.h"
 #include "daemon/cli/recalibrate.h"
 #include "daemon/cli/triangulate.h"
+#include "daemon/cli/verify.h"
 #include "measure/pose.h"
 
 namespace zeropose {
@@ -285,6 +286,7 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_find_body(app, exit_status);
   add_plan(app, exit_status);
   add_triangulate(app, exit_status);
+  add_verify(app, exit_status);
   add_recalibrate(app, exit_status);
 }
 

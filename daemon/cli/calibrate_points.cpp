@@ -214,13 +214,13 @@ void add_calibrate_points(CLI::App& calibrate, int& exit_status) {
   add_points_options(*verb, *options);
   verb->footer(calibrate_points_help);
   verb->callback([options, &exit_status] {
-    const auto calibrate = [&] {
+    const auto answer = [&] {
       refuse_contradictions(*options);
       return calibrate_from(*options, load_calibration_points(options->points),
                             concat({"Points: ", std::filesystem::path(options->points).filename().string()}))
           .answer;
     };
-    exit_status = run(calibrate, options->json);
+    exit_status = run(answer, options->json);
   });
 }
 

@@ -114,10 +114,10 @@ TEST(FrameFit, RefusesWhatSaysNothing) {
 // Against draws: the covariance of the product is that of its factors' noise.
 TEST(Chain, CovarianceIsThatOfTheProduct) {
   Random random(6);
-  const UncertainPose X_AB{test::uniform_pose(random, 1000), 1e-6 * Matrix6::Identity()};
+  const UncertainPose X_AB{test::uniform_pose(random, 1000), 1e-10 * Matrix6::Identity()};
   Matrix6 root = Matrix6::Zero();
   for (int i = 0; i < 6; ++i)
-    for (int k = 0; k <= i; ++k) root(i, k) = 1e-3 * test::normal(random);
+    for (int k = 0; k <= i; ++k) root(i, k) = 1e-5 * test::normal(random);
   const UncertainPose X_BC{test::uniform_pose(random, 1000), root * root.transpose()};
   const UncertainPose X_AC = chain(X_AB, X_BC);
   EXPECT_EQ(X_AC.X.matrix(), (X_AB.X * X_BC.X).matrix());
@@ -125,7 +125,7 @@ TEST(Chain, CovarianceIsThatOfTheProduct) {
   constexpr int draws = 4000;
   for (int k = 0; k < draws; ++k) {
     Vector6 a, b;
-    for (int i = 0; i < 6; ++i) a(i) = 1e-3 * test::normal(random), b(i) = test::normal(random);
+    for (int i = 0; i < 6; ++i) a(i) = 1e-5 * test::normal(random), b(i) = test::normal(random);
     const Pose drawn = moved(X_AB.X, a) * moved(X_BC.X, root * b);
     const Vector6 off = difference(X_AC.X, drawn);
     inside += off.dot(X_AC.covariance.ldlt().solve(off)) < 12.592 ? 1 : 0;

@@ -24,14 +24,14 @@ std::vector<CalibrationPoint> points_of(const std::vector<BodyMark>& marks, cons
 }
 
 // The four cameras of Table 4.7 with their internals and poses, the body's marks as discs of 9 mm radius. The
-// covariances of the finder carry the tolerance: all parameters together lie within the ellipsoid that holds
-// them but once in a thousand (11 numbers: 31.26), and one that is no wider than the noise of the picture
-// allows: a hundredth of a pixel over 44 marks.
+// covariances of the finder carry the tolerance: all eleven numbers together lie within the ellipsoid that
+// holds them but once in a thousand (31.26).
 TEST(BodyCalibration, PictureToCamera) {
   const test::CsvTable table("tests/golden/camera-in-body.csv");
   for (std::size_t row = 0; row < table.size(); ++row) {
     BodyScene scene;
     scene.radius_mm = 9;
+    scene.noise_grey = 4;  // well above what the finder's model leaves, 0.01 px
     scene.seed = 20 + row;
     scene.camera = {768,
                     572,
@@ -57,7 +57,7 @@ TEST(BodyCalibration, PictureToCamera) {
     const CalibrationResult camera = calibrate(calibration);
     ASSERT_EQ(camera.status, CalibrationStatus::ok) << camera.reason;
     ASSERT_EQ(camera.uncertainty.parameters.size(), 11u);
-    EXPECT_LT(camera.rms_px, 0.03);
+    EXPECT_LT(camera.rms_px, 0.1);
     Eigen::VectorXd off(11);
     const Vector6 pose_off = difference(X_BC, camera.X_WC);
     const Internals internals_off = internals_of(camera.model) - internals_of(scene.camera);
