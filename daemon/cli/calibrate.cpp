@@ -14,6 +14,7 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   add_calibrate_vanishing(*verb, exit_status);
   add_calibrate_pose(*verb, exit_status);
   add_calibrate_body(*verb, exit_status);
+  add_calibrate_sensor(*verb, exit_status);
 }
 
 }  // namespace zeropose

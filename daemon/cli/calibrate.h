@@ -12,6 +12,7 @@ void add_calibrate(CLI::App& app, int& exit_status);
 void add_calibrate_body(CLI::App& calibrate, int& exit_status);
 void add_calibrate_points(CLI::App& calibrate, int& exit_status);
 void add_calibrate_pose(CLI::App& calibrate, int& exit_status);
+void add_calibrate_sensor(CLI::App& calibrate, int& exit_status);
 void add_calibrate_vanishing(CLI::App& calibrate, int& exit_status);
 
 }  // namespace zeropose
