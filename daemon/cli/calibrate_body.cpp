@@ -24,7 +24,7 @@ using namespace cli;
 
 constexpr const char* calibrate_body_help =
     R"(One camera from a picture of a calibration body (see find-body), or from the points that find-body --csv wrote. All
-options of calibrate points; X_BC is the camera's pose in the body. Without --start the internals need not be known.
+options of calibrate points, but --refine is joint unless it is given; X_BC is the camera's pose in the body. Without --start the internals need not be known.
 control.csv: columns [mark] xa ya za xb yb zb [weight], the body's control marks as the measuring system sees them
 (A: the world W) and in the body (B): X_WB by best fit, X_WC = X_WB X_BC, and the camera that is answered and written
 stands in the world. Without --control it stands in the body's frame. A control mark that contradicts the others is
@@ -182,6 +182,8 @@ Answer calibrate_body(Options options) {
 
 void add_calibrate_body(CLI::App& calibrate, int& exit_status) {
   auto options = std::make_shared<Options>();
+  // Maximum likelihood: the marks' places are as good as their covariances say.
+  options->points.refine = "joint";
   CLI::App* verb =
       calibrate.add_subcommand("body", "One camera from a calibration body, in the world by its control marks");
   CLI::Option* image = verb->add_option("--image", options->body.image, "picture of the body");

@@ -14,7 +14,7 @@ from program import Case, run, run_json
 
 BODY = pathlib.Path(sys.argv[2]) / "tests/golden/calibration-body.csv"
 WIDTH, HEIGHT, FOCAL, CX, CY, RADIUS = 640, 480, 1500, 325, 236, 9
-PLACE = (700.0, 800.0, 600.0)  # of the camera in the body
+PLACE = (900.0, 1000.0, 780.0)  # of the camera in the body
 
 
 def minus(a, b):
@@ -104,16 +104,20 @@ class Body(Case):
         with open(self.path("p.csv")) as file:
             self.assertEqual([row["mark"] for row in csv.DictReader(file)], [p["mark"] for p in found["points"]])
 
-    def expect_camera(self, camera, p):
-        self.expect_near(p[:3], PLACE, 0.5)
-        self.assertAlmostEqual(camera["fx"], FOCAL, delta=1)
+    def expect_camera(self, found, p):
+        """Within five of the sigmas that come from the residuals."""
+        sigma = found["sigma"]
+        for axis, name in enumerate("xyz"):
+            self.assertAlmostEqual(p[axis], PLACE[axis], delta=5 * sigma[name])
+            self.assertLess(sigma[name], 2)
+        self.assertAlmostEqual(found["camera"]["fx"], FOCAL, delta=5 * sigma["fx"])
 
     def test_the_table_is_ready_for_calibrate(self):
         self.find("--csv", self.path("p.csv"))
         size = "--width", WIDTH, "--height", HEIGHT
         status, points, _ = run_json("calibrate", "points", "--points", self.path("p.csv"), *size)
         self.assertEqual(status, 0)
-        self.expect_camera(points["camera"], points["camera"]["X_WC"])
+        self.expect_camera(points, points["camera"]["X_WC"])
         status, body, _ = run_json("calibrate", "body", "--points", self.path("p.csv"), *size)
         self.assertEqual((status, body["X_BC"]), (0, points["camera"]["X_WC"]))
         self.assertEqual(body["camera"], points["camera"])
@@ -132,7 +136,7 @@ class Body(Case):
     def test_control_marks_put_the_camera_into_the_world(self):
         status, found, err = self.calibrate("--control", self.control(), "--output", self.path("camera.json"))
         self.assertEqual((status, found["status"]), (0, "ok"), err)
-        self.expect_camera(found["camera"], found["X_BC"])
+        self.expect_camera(found, found["X_BC"])
         self.expect_near(found["X_WB"], (1000, 2000, 5, 0, 0, 90), 1e-6)
         x, y, z = found["X_BC"][:3]
         self.expect_near(found["X_WC"][:3], (1000 - y, 2000 + x, z + 5), 1e-6)
