@@ -87,9 +87,9 @@ FrameFitResult line_of(std::span<const MeasuredPair> pairs) {
   const Vector3d squares = symmetric_eigen(sum).values.cwiseMax(0);
   const double across = std::sqrt(squares(0) + squares(1)), along = std::sqrt(squares(2));
   if (across > line_share * along) return {};
-  return failed(FrameFitStatus::collinear, "the " + number(pairs.size()) + " points lie on a line: " +
-                                               number(across) + " mm across over " + number(along) +
-                                               " mm along (root mean square)");
+  return failed(FrameFitStatus::collinear,
+                "the " + number(pairs.size()) + " points lie on a line: " + number(across) +
+                    " mm across over " + number(along) + " mm along (root mean square)");
 }
 
 std::string list_of(const std::vector<std::size_t>& points) {
@@ -141,8 +141,8 @@ FrameFitResult fit_frames(std::span<const MeasuredPair> pairs) {
   if (FrameFitResult line = line_of(pairs); line.status != FrameFitStatus::failed) return line;
   std::vector<PointPair> plain;
   for (const MeasuredPair& pair : pairs)
-    plain.push_back({pair.p_A_mm, pair.p_B_mm,
-                     1 / (pair.covariance_A_mm2.trace() + pair.covariance_B_mm2.trace())});
+    plain.push_back(
+        {pair.p_A_mm, pair.p_B_mm, 1 / (pair.covariance_A_mm2.trace() + pair.covariance_B_mm2.trace())});
   const BestFitResult start = best_fit(plain);
   if (start.status != BestFitStatus::ok)
     return failed(FrameFitStatus::collinear, "the points lie on a line in one of the frames");
@@ -162,10 +162,11 @@ FrameFitResult fit_frames(std::span<const MeasuredPair> pairs) {
   fill(pairs, used, wrong, result);
   if (wrong.agree) return result;
   result.status = FrameFitStatus::contradiction;
-  result.reason = "the points contradict each other by " + number(result.rms_mm, 3) +
-                  " mm (root mean square), more than their sigmas allow" +
-                  (wrong.suspects.empty() ? std::string(", and no single one explains it")
-                                          : ", wrong is one of points " + list_of(wrong.suspects) + " (from 1)");
+  result.reason =
+      "the points contradict each other by " + number(result.rms_mm, 3) +
+      " mm (root mean square), more than their sigmas allow" +
+      (wrong.suspects.empty() ? std::string(", and no single one explains it")
+                              : ", wrong is one of points " + list_of(wrong.suspects) + " (from 1)");
   return result;
 }
 
@@ -174,8 +175,8 @@ UncertainPose chain(const UncertainPose& X_AB, const UncertainPose& X_BC) {
   Matrix6 turn = Matrix6::Zero(), lever = Matrix6::Identity();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
   lever.topRightCorner<3, 3>() = -cross_matrix(R * X_BC.X.translation());
-  return {X_AB.X * X_BC.X, lever * X_AB.covariance * lever.transpose() +
-                               turn * X_BC.covariance * turn.transpose()};
+  return {X_AB.X * X_BC.X,
+          lever * X_AB.covariance * lever.transpose() + turn * X_BC.covariance * turn.transpose()};
 }
 
 }  // namespace zeropose

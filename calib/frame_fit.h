@@ -36,7 +36,7 @@ struct FrameFitResult {
   FrameFitStatus status = FrameFitStatus::failed;
   std::string reason;  // one sentence with the numbers, empty when ok
   Pose X_AB = Pose::Identity();
-  Matrix6 covariance = Matrix6::Zero();  // of the delta in moved(), from the points' covariances
+  Matrix6 covariance = Matrix6::Zero();       // of the delta in moved(), from the points' covariances
   std::vector<Eigen::Vector3d> residuals_mm;  // p_A - X_AB * p_B, in the order of the pairs
   double rms_mm = 0;                          // root of the mean squared distance over the points used
   int redundancy = 0;

@@ -12,7 +12,8 @@ namespace {
 
 // The index of the element of this name; a mistake where there is none.
 template <typename List, typename Name>
-std::size_t index_of(CsvTable& table, std::size_t row, std::string_view column, const List& list, Name name_of) {
+std::size_t index_of(CsvTable& table, std::size_t row, std::string_view column, const List& list,
+                     Name name_of) {
   const std::string name = table.text(row, column);
   const auto found = std::ranges::find(list, name, name_of);
   if (found != list.end()) return static_cast<std::size_t>(found - list.begin());
@@ -43,8 +44,7 @@ std::vector<KnownPoint> load_known_points(const std::filesystem::path& path, dou
 }
 
 NamedPoses load_named_poses(const std::filesystem::path& path) {
-  CsvTable table =
-      load_csv(path, {{"view", "x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"}, {}});
+  CsvTable table = load_csv(path, {{"view", "x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"}, {}});
   NamedPoses poses;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     const std::string name = table.text(row, "view");
@@ -54,8 +54,8 @@ NamedPoses load_named_poses(const std::filesystem::path& path) {
       return table.number(row, column, -largest_mm, largest_mm);
     };
     const auto angle = [&](const char* column) { return table.number(row, column, -360, 360); };
-    poses.emplace_back(name, from_six_numbers({length("x_mm"), length("y_mm"), length("z_mm"), angle("rx_deg"),
-                                               angle("ry_deg"), angle("rz_deg")}));
+    poses.emplace_back(name, from_six_numbers({length("x_mm"), length("y_mm"), length("z_mm"),
+                                               angle("rx_deg"), angle("ry_deg"), angle("rz_deg")}));
   }
   table.throw_if_wrong();
   return poses;

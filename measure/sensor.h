@@ -23,7 +23,7 @@ struct KnownPoint {
 // The pixels of one point at one position of the sensor.
 struct SensorSighting {
   std::size_t point = 0;
-  std::string view;  // its position's name, empty for a stationary sensor
+  std::string view;          // its position's name, empty for a stationary sensor
   std::optional<Pose> X_RH;  // none: stationary
   std::vector<Observation> observations;
 };

@@ -60,7 +60,8 @@ Control control_of(const Options& options) {
 }
 
 Json control_json(const Control& control) {
-  Json json = {{"what", name_of(control.fit.status)}, {"rms_mm", control.fit.rms_mm}, {"marks", Json::array()}};
+  Json json = {
+      {"what", name_of(control.fit.status)}, {"rms_mm", control.fit.rms_mm}, {"marks", Json::array()}};
   for (std::size_t i = 0; i < control.fit.residuals_mm.size(); ++i) {
     const auto is_in = [i](const std::vector<std::size_t>& list) {
       return std::find(list.begin(), list.end(), i) != list.end();
@@ -128,7 +129,8 @@ void add_world(const Options& options, const Control& control, PointsAnswer& fou
        << table_of(six_of(X_WB.X)) << "\nX_WC = X_WB X_BC:\n"
        << table_of(six_of(X_WC.X)) << "\n";
   if (!control.fit.removed.empty())
-    text << "left out, contradicts the other control marks: " << names_of(control, control.fit.removed) << "\n";
+    text << "left out, contradicts the other control marks: " << names_of(control, control.fit.removed)
+         << "\n";
   if (!options.points.output.empty()) {
     replace_file(options.points.output,
                  camera_file_text({{options.points.name, found.result.model, X_WC.X}, true}));
@@ -184,13 +186,15 @@ void add_calibrate_body(CLI::App& calibrate, int& exit_status) {
   auto options = std::make_shared<Options>();
   // Maximum likelihood: the marks' places are as good as their covariances say.
   options->points.refine = "joint";
-  CLI::App* verb =
-      calibrate.add_subcommand("body", "One camera from a calibration body, in the world by its control marks");
+  CLI::App* verb = calibrate.add_subcommand(
+      "body", "One camera from a calibration body, in the world by its control marks");
   CLI::Option* image = verb->add_option("--image", options->body.image, "picture of the body");
   verb->add_option("--body", options->body.body, "CSV: mark x_mm y_mm z_mm [radius_mm nx ny nz]");
-  verb->add_option("--points", options->points.points, "CSV of find-body instead of a picture")->excludes(image);
+  verb->add_option("--points", options->points.points, "CSV of find-body instead of a picture")
+      ->excludes(image);
   verb->add_option("--control", options->control, "CSV: [mark] xa ya za xb yb zb, control marks in W and B");
-  verb->add_option("--control-sigma-mm", options->control_sigma_mm, "of one coordinate of a control mark (0.05)")
+  verb->add_option("--control-sigma-mm", options->control_sigma_mm,
+                   "of one coordinate of a control mark (0.05)")
       ->check(CLI::Range(1e-6, 100.0));
   add_body_options(*verb, options->body);
   add_points_options(*verb, options->points);

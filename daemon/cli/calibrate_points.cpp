@@ -196,9 +196,9 @@ PointsAnswer calibrate_from(const PointsOptions& options, std::vector<Calibratio
     found.answer = calibration_failure(found.result);
     return found;
   }
-  const CalibrationReport report{
-      input->problem, found.result, options.name, source, options.pitch_mm, options.frame_offset_z_mm,
-      input->active};
+  const CalibrationReport report{input->problem, found.result,     options.name,
+                                 source,         options.pitch_mm, options.frame_offset_z_mm,
+                                 input->active};
   found.answer.json = calibration_json(report);
   found.answer.text = calibration_text(report, options.angles == "rad");
   write_files(options, report, found.answer);

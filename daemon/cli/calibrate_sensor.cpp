@@ -62,7 +62,8 @@ Json sighting_json(const Input& input, const SensorResult& result, std::size_t i
 
 Json sensor_json(const Input& input, const SensorResult& result, const char* pose) {
   const bool good = result.fit.status == FrameFitStatus::ok;
-  Json json = {{"status", good ? "ok" : "failed"}, {"reason", result.fit.reason},
+  Json json = {{"status", good ? "ok" : "failed"},
+               {"reason", result.fit.reason},
                {"what", name_of(result.fit.status)}};
   json[pose] = good ? Json(six_of(result.fit.X_AB)) : Json();
   Vector6 sigma = result.fit.covariance.diagonal().cwiseSqrt();
@@ -87,10 +88,10 @@ std::string sensor_text(const Input& input, const SensorResult& result, const ch
        << table_of({sigma.data(), 6}) << "\nresiduals, mm (" << result.fit.rms_mm << " rms):\n";
   for (std::size_t i = 0; i < input.sightings.size(); ++i) {
     const SensorSighting& sighting = input.sightings[i];
-    const bool removed = std::find(result.fit.removed.begin(), result.fit.removed.end(), i) !=
-                         result.fit.removed.end();
-    text << table_of({result.fit.residuals_mm[i].data(), 3}) << "  " << input.points[sighting.point].name << " "
-         << sighting.view << (removed ? "  left out: it contradicts the others" : "") << "\n";
+    const bool removed =
+        std::find(result.fit.removed.begin(), result.fit.removed.end(), i) != result.fit.removed.end();
+    text << table_of({result.fit.residuals_mm[i].data(), 3}) << "  " << input.points[sighting.point].name
+         << " " << sighting.view << (removed ? "  left out: it contradicts the others" : "") << "\n";
   }
   return text.str();
 }
@@ -122,9 +123,10 @@ void add_calibrate_sensor(CLI::App& calibrate_verb, int& exit_status) {
   verb->add_option("--robot", options->robot, "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, X_RH");
   verb->add_option("--sigma-mm", options->sigma_mm, "of one coordinate of a known point (0.02)")
       ->check(CLI::Range(1e-6, 100.0));
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, X_WS or X_HS, sigma, covariance, rms_mm, points\n"
-                 "[{point, view, p_S, residual_mm, ray_gap_mm, removed, suspect}]");
+  verb->add_flag(
+      "--json", options->json,
+      "one JSON object on stdout: status, reason, X_WS or X_HS, sigma, covariance, rms_mm, points\n"
+      "[{point, view, p_S, residual_mm, ray_gap_mm, removed, suspect}]");
   verb->footer(calibrate_sensor_help);
   verb->callback(
       [options, &exit_status] { exit_status = run([&] { return calibrate(*options); }, options->json); });

@@ -105,7 +105,8 @@ void add_body_options(CLI::App& verb, BodyOptions& options) {
   CLI::Option* camera =
       verb.add_option("--camera", options.camera, "camera JSON: the internals about as they are");
   verb.add_option("--camera-name", options.camera_name, "of the camera, where that file holds several");
-  verb.add_option("--focal-px", options.focal_px, "focal length in px within 20 %, where there is no camera file")
+  verb.add_option("--focal-px", options.focal_px,
+                  "focal length in px within 20 %, where there is no camera file")
       ->check(CLI::Range(1.0, 1e6))
       ->excludes(camera);
   verb.add_option("--radius-mm", options.radius_mm, "of the marks whose radius the table does not say")
@@ -126,10 +127,10 @@ FoundBody find_body_in(const BodyOptions& options) {
   if (!options.camera.empty()) {
     problem.camera = load_camera(options.camera, options.camera_name).camera.model;
     if (problem.camera->width_px != image.width_px || problem.camera->height_px != image.height_px)
-      throw std::invalid_argument(concat(
-          {options.image, ": found ", std::to_string(image.width_px), " x ", std::to_string(image.height_px),
-           " px, expected ", std::to_string(problem.camera->width_px), " x ",
-           std::to_string(problem.camera->height_px), " px as in ", options.camera}));
+      throw std::invalid_argument(
+          concat({options.image, ": found ", std::to_string(image.width_px), " x ",
+                  std::to_string(image.height_px), " px, expected ", std::to_string(problem.camera->width_px),
+                  " x ", std::to_string(problem.camera->height_px), " px as in ", options.camera}));
   }
   found.width_px = image.width_px;
   found.height_px = image.height_px;
@@ -146,10 +147,10 @@ FoundBody find_body_in(const BodyOptions& options) {
 Json body_json(const FoundBody& found) {
   const BodyResult& result = found.result;
   const bool good = result.status == BodyStatus::found;
-  Json json = {{"status", good ? "ok" : "failed"},   {"reason", result.reason},
-               {"name", name_of(result.status)},     {"points", Json::array()},
-               {"missing", Json::array()},           {"discs", result.discs},
-               {"explained", result.explained},      {"next_best", result.next_best}};
+  Json json = {{"status", good ? "ok" : "failed"}, {"reason", result.reason},
+               {"name", name_of(result.status)},   {"points", Json::array()},
+               {"missing", Json::array()},         {"discs", result.discs},
+               {"explained", result.explained},    {"next_best", result.next_best}};
   for (const BodyPoint& point : result.points)
     json["points"].push_back(point_json(found.marks[point.mark], point));
   for (const std::size_t mark : result.missing) json["missing"].push_back(found.marks[mark].name);
@@ -176,10 +177,10 @@ void add_find_body(CLI::App& app, int& exit_status) {
   add_body_options(*verb, options->body);
   verb->add_option("--csv", options->csv,
                    "writes the points: mark x_mm y_mm z_mm u_px v_px suu svv suv radius_mm nx ny nz");
-  verb->add_flag(
-      "--json", options->json,
-      "one JSON object on stdout: status, reason, points [{mark, x_mm, y_mm, z_mm, u_px, v_px, suu, svv, suv,\n"
-      "radius_mm, nx, ny, nz}], missing [mark], discs, explained, next_best");
+  verb->add_flag("--json", options->json,
+                 "one JSON object on stdout: status, reason, points [{mark, x_mm, y_mm, z_mm, u_px, v_px, "
+                 "suu, svv, suv,\n"
+                 "radius_mm, nx, ny, nz}], missing [mark], discs, explained, next_best");
   verb->footer(find_body_help);
   verb->callback(
       [options, &exit_status] { exit_status = run([&] { return find(*options); }, options->json); });

@@ -165,7 +165,8 @@ void add_verify(CLI::App& app, int& exit_status) {
   verb->add_option("--cell", options->cell, "the cell file")->required();
   verb->add_option("--points", options->points, "CSV: mark or point, x_mm y_mm z_mm measured in the world")
       ->required();
-  CLI::Option* state = verb->add_option("--state", options->state, "the daemon's state directory, with the zero");
+  CLI::Option* state =
+      verb->add_option("--state", options->state, "the daemon's state directory, with the zero");
   verb->add_option("--pose", options->pose, "x,y,z,rx,ry,rz: X_WO instead of a zero")->excludes(state);
   verb->add_option("--job", options->job, "its name (the first one)");
   verb->add_option("--max-mm", options->max_mm, "largest error of a point (1)")->check(CLI::Range(1e-6, 1e6));

@@ -33,7 +33,8 @@ Vector3d draw(Random& random, const Matrix3d& covariance) {
 std::vector<MeasuredPair> measured(Random& random, const Pose& X_AB, double sigma_A_mm, double sigma_B_mm) {
   std::vector<MeasuredPair> pairs;
   for (const Vector3d& p_B : corners_B) {
-    MeasuredPair pair{X_AB * p_B, p_B, some_covariance(random, sigma_A_mm), some_covariance(random, sigma_B_mm)};
+    MeasuredPair pair{X_AB * p_B, p_B, some_covariance(random, sigma_A_mm),
+                      some_covariance(random, sigma_B_mm)};
     pair.p_A_mm += draw(random, pair.covariance_A_mm2);
     pair.p_B_mm += draw(random, pair.covariance_B_mm2);
     pairs.push_back(pair);

@@ -107,8 +107,8 @@ TEST(Sensor, StandsInTheWorldWithAnHonestCovariance) {
 }
 
 TEST(Sensor, SitsOnTheHandWithAnHonestCovariance) {
-  const double share = share_inside(
-      X_HS, 1500, [](std::uint64_t seed) { return on_hand(seed, places_S, 7).calibrate(); });
+  const double share =
+      share_inside(X_HS, 1500, [](std::uint64_t seed) { return on_hand(seed, places_S, 7).calibrate(); });
   EXPECT_GT(share, 0.93);
   EXPECT_LT(share, 0.97);
 }
