@@ -64,7 +64,7 @@ const std::vector<Vector3d> places_S{
 Scene stationary(std::uint64_t seed) {
   Scene scene(seed);
   for (std::size_t k = 0; k < places_S.size(); ++k) {
-    scene.add_known("p" + std::to_string(k), X_WS * places_S[k], 0.03);
+    scene.add_known(std::string("p").append(std::to_string(k)), X_WS * places_S[k], 0.03);
     scene.see(k, X_WS, "", {});
   }
   return scene;
@@ -79,7 +79,7 @@ Scene on_hand(std::uint64_t seed, const std::vector<Vector3d>& seen_S, double tu
     Pose X_RS = from_six_numbers({0, 0, 0, 170 + turn, -turn / 2, 30 + 2 * turn});
     X_RS.translation() = p_R - X_RS.linear() * seen_S[k];
     // Each position errs by itself: the robot's uncertainty counts as that of the point.
-    scene.add_known("tip" + std::to_string(k), p_R, 0.05);
+    scene.add_known(std::string("tip").append(std::to_string(k)), p_R, 0.05);
     scene.see(k, X_RS, std::to_string(k + 1), X_RS * X_HS.inverse());
   }
   return scene;
