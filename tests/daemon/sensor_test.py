@@ -83,6 +83,23 @@ class Sensor(Case):
         self.assertEqual((status, found["what"]), (1, "too_few_points"))
         self.assertIn("more positions of the hand", found["reason"])
 
+    def test_known_positions_of_a_board_on_a_stage(self):
+        """The world is the stage's; the camera stands 600 mm before its zero, 40 mm to the right."""
+        rows, poses = "view,x_mm,y_mm,u_px,v_px\n", "view,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n"
+        for k, at in enumerate((0, 60, 120)):
+            poses += f"{k},0,0,{at},0,0,0\n"
+            for x in range(-120, 121, 40):
+                for y in range(-120, 121, 40):
+                    rows += f"{k},{x},{y},{500 + FOCAL * (x - 40) / (600 + at)},{400 + FOCAL * y / (600 + at)}\n"
+        views = ("calibrate", "views", "--points", self.write("v.csv", rows), "--width", 1000, "--height", 800)
+        status, found, err = run_json(*views, "--poses", self.write("stage.csv", poses))
+        self.assertEqual((status, found["status"]), (0, "ok"), err)
+        self.expect_near(found["camera"]["X_WC"], (40, 0, -600, 0, 0, 0), 1e-4)
+        self.assertAlmostEqual(found["camera"]["fx"], FOCAL, 3)
+        self.expect_near(found["views"][2]["X_WB"], (0, 0, 120, 0, 0, 0), 1e-9)
+        self.expect_refused(run(*views, "--poses", self.write("more.csv", poses + "9,0,0,0,0,0,0\n")), '"9"',
+                            "has no points")
+
     def test_wrong_usage(self):
         self.stationary(PLACES)
         self.write("o.csv", "point,camera,u_px,v_px\np9,left,1,2\np1,middle,1,2\np1,left,1,2\np1,left,1,2\n")
