@@ -156,9 +156,9 @@ bool is_empty(const std::vector<Near>& near, const Near& a, const Near& b, std::
 
 }  // namespace
 
-std::vector<Cell> cells_of(std::span<const Vector2d> points, std::span<const Matrix2d> metric) {
-  std::vector<Cell> cells;
-  std::set<Cell> known;
+std::vector<BodyCell> cells_of(std::span<const Vector2d> points, std::span<const Matrix2d> metric) {
+  std::vector<BodyCell> cells;
+  std::set<BodyCell> known;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::vector<Near> near = near_points(points, i, metric[i]);
     const std::size_t count = std::min(near_enough, near.size());
@@ -174,8 +174,8 @@ std::vector<Cell> cells_of(std::span<const Vector2d> points, std::span<const Mat
         if (across == points.size() || across == first.point || across == second.point ||
             !is_empty(near, first, second, across))
           continue;
-        const Cell cell{i, first.point, across, second.point};
-        Cell sorted = cell;
+        const BodyCell cell{i, first.point, across, second.point};
+        BodyCell sorted = cell;
         std::sort(sorted.begin(), sorted.end());
         if (known.insert(sorted).second) cells.push_back(cell);
       }

@@ -12,14 +12,14 @@
 namespace zeropose {
 
 // Four neighbours in the order round the parallelogram: corner, first side, across, second side.
-using Cell = std::array<std::size_t, 4>;
+using BodyCell = std::array<std::size_t, 4>;
 
 struct BodyPlane {
   std::vector<std::size_t> marks;
   std::vector<Eigen::Vector2d> places;  // of the marks in the plane, mm
   Eigen::Vector3d origin_B = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes_B = Eigen::Matrix3d::Identity();  // columns: the plane's x, y and normal
-  std::vector<Cell> cells;                               // into `marks`, turning from x to y
+  std::vector<BodyCell> cells;                           // into `marks`, turning from x to y
 };
 
 struct BodyLayout {
@@ -34,6 +34,7 @@ BodyLayout layout_of(std::span<const BodyMark> marks);
 
 // All parallelograms of neighbours among points with no other point in them, each once, turning from x to y.
 // metric: per point, turns offsets into lengths that can be compared in all directions.
-std::vector<Cell> cells_of(std::span<const Eigen::Vector2d> points, std::span<const Eigen::Matrix2d> metric);
+std::vector<BodyCell> cells_of(std::span<const Eigen::Vector2d> points,
+                               std::span<const Eigen::Matrix2d> metric);
 
 }  // namespace zeropose

@@ -48,10 +48,10 @@ class Matcher {
       : discs_(discs), marks_(marks), layout_(layout), index_(plane), plane_(layout.planes[plane]) {}
 
   // Grown from four discs that are taken for the marks of a cell.
-  std::optional<PlaneMatch> grow(const Cell& discs, const Cell& cell) const;
+  std::optional<PlaneMatch> grow(const BodyCell& discs, const BodyCell& cell) const;
 
  private:
-  bool begin(const Cell& discs, const Cell& cell, PlaneMatch& match) const;
+  bool begin(const BodyCell& discs, const BodyCell& cell, PlaneMatch& match) const;
   bool fits(std::size_t k, const Matrix2d& stretch, std::size_t disc, const PlaneMatch& match) const;
   std::optional<Matrix3d> map_of(const PlaneMatch& match) const;
   bool extend(const Matrix3d& H, PlaneMatch& match) const;
@@ -78,7 +78,7 @@ bool Matcher::fits(std::size_t k, const Matrix2d& stretch, std::size_t disc, con
 }
 
 // The affine map of the four is enough to see whether they are round.
-bool Matcher::begin(const Cell& discs, const Cell& cell, PlaneMatch& match) const {
+bool Matcher::begin(const BodyCell& discs, const BodyCell& cell, PlaneMatch& match) const {
   Matrix2d places, pixels;
   const auto side = [](const auto& at, int which) -> Vector2d {
     return which == 0 ? 0.5 * (at(1) - at(0) + at(2) - at(3)) : 0.5 * (at(3) - at(0) + at(2) - at(1));
@@ -162,7 +162,7 @@ Matrix3d affine_of(const PlaneMatch& match, const Vector2d& place, const Vector2
   return A;
 }
 
-std::optional<PlaneMatch> Matcher::grow(const Cell& discs, const Cell& cell) const {
+std::optional<PlaneMatch> Matcher::grow(const BodyCell& discs, const BodyCell& cell) const {
   PlaneMatch match;
   if (!begin(discs, cell, match)) return std::nullopt;
   // The cheap map of the four decides whether it is worth while: most readings have no next mark.
@@ -188,8 +188,8 @@ std::optional<PlaneMatch> Matcher::grow(const Cell& discs, const Cell& cell) con
 }
 
 // The cell begun at each of its corners, and both ways round.
-std::array<Cell, 8> turned(const Cell& cell) {
-  std::array<Cell, 8> all;
+std::array<BodyCell, 8> turned(const BodyCell& cell) {
+  std::array<BodyCell, 8> all;
   for (std::size_t k = 0; k < 4; ++k) {
     for (std::size_t corner = 0; corner < 4; ++corner) {
       all[k][corner] = cell[(k + corner) % 4];
@@ -199,7 +199,7 @@ std::array<Cell, 8> turned(const Cell& cell) {
   return all;
 }
 
-bool is_part_of(const Cell& discs, const Cell& cell, const PlaneMatch& match) {
+bool is_part_of(const BodyCell& discs, const BodyCell& cell, const PlaneMatch& match) {
   for (std::size_t k = 0; k < 4; ++k)
     if (match.disc_of[cell[k]] != discs[k]) return false;
   return true;
@@ -226,13 +226,13 @@ std::vector<PlaneMatch> match_planes(std::span<const LatticeDisc> discs, std::sp
     metric.push_back(whitener(disc.shape_px2));
   }
   std::vector<PlaneMatch> matches;
-  const std::vector<Cell> seen = cells_of(pixels, metric);
+  const std::vector<BodyCell> seen = cells_of(pixels, metric);
   for (std::size_t plane = 0; plane < layout.planes.size(); ++plane) {
     const Matcher matcher(discs, marks, layout, plane);
     const auto first = static_cast<std::ptrdiff_t>(matches.size());
-    for (const Cell& four : seen)
-      for (const Cell& cell : layout.planes[plane].cells)
-        for (const Cell& reading : turned(cell)) {
+    for (const BodyCell& four : seen)
+      for (const BodyCell& cell : layout.planes[plane].cells)
+        for (const BodyCell& reading : turned(cell)) {
           if (std::any_of(matches.begin() + first, matches.end(),
                           [&](const PlaneMatch& match) { return is_part_of(four, reading, match); }))
             continue;
