@@ -10,8 +10,9 @@ namespace zeropose {
 namespace {
 
 CsvColumns columns_and(std::vector<std::string_view> required, std::vector<std::string_view> optional) {
-  CsvColumns columns{{"x_mm", "y_mm", "u_px", "v_px"},
-                     {"z_mm", "suu", "svv", "suv", "radius_mm", "nx", "ny", "nz", "id", "row", "col"}};
+  CsvColumns columns{
+      {"x_mm", "y_mm", "u_px", "v_px"},
+      {"z_mm", "suu", "svv", "suv", "radius_mm", "nx", "ny", "nz", "id", "row", "col", "mark"}};
   columns.required.insert(columns.required.end(), required.begin(), required.end());
   columns.optional.insert(columns.optional.end(), optional.begin(), optional.end());
   return columns;

@@ -11,8 +11,8 @@
 
 namespace zeropose {
 
-// Columns x_mm y_mm [z_mm] u_px v_px [suu svv suv] [radius_mm nx ny nz]; id, row and col are allowed and not
-// read.
+// Columns x_mm y_mm [z_mm] u_px v_px [suu svv suv] [radius_mm nx ny nz]; id, row, col and mark are allowed
+// and not read.
 //   z_mm           without the column 0: a board
 //   suu svv suv    px^2, all or none; none: the identity, one pixel
 //   radius_mm      of a flat disc, whose normal nx ny nz (any length) must then be given

@@ -71,14 +71,14 @@ std::vector<std::uint8_t> png_of(const cv::Mat& picture) {
   return png;
 }
 
-void draw(cv::Mat& picture, const BoardPoint& point) {
+// A round point with its name.
+void draw(cv::Mat& picture, const BoardPoint& point, const std::string& text) {
   const Eigen::Vector2d across(3, 0), along(0, 3);
   cv::line(picture, fixed(point.u_px - across), fixed(point.u_px + across), green, 1, cv::LINE_AA, sub_bits);
   cv::line(picture, fixed(point.u_px - along), fixed(point.u_px + along), green, 1, cv::LINE_AA, sub_bits);
   if (point.diameter_px > 0)
     cv::circle(picture, fixed(point.u_px), static_cast<int>(point.diameter_px / 2 + 1) << sub_bits, green, 1,
                cv::LINE_AA, sub_bits);
-  const std::string text = std::to_string(point.at.row) + "." + std::to_string(point.at.col);
   const cv::Point corner(static_cast<int>(point.u_px.x()) + 4, static_cast<int>(point.u_px.y()) - 4);
   cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, 0.3, cv::Scalar(0, 0, 0), 2, cv::LINE_AA);
   cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, 0.3, green, 1, cv::LINE_AA);
@@ -99,9 +99,21 @@ std::vector<std::uint8_t> overlay_png(const ImageView& image, const BoardResult&
     const bool turn = last.at.row != next.at.row;
     cv::line(picture, fixed(last.u_px), fixed(next.u_px), turn ? red : blue, 1, cv::LINE_AA, sub_bits);
   }
-  for (const BoardPoint& point : board.points) draw(picture, point);
+  for (const BoardPoint& point : board.points)
+    draw(picture, point, std::to_string(point.at.row) + "." + std::to_string(point.at.col));
   if (!board.reason.empty())
     write_text(picture, board.reason, {4, 14}, board.status == BoardStatus::found ? blue : red);
+  return png_of(picture);
+}
+
+std::vector<std::uint8_t> overlay_png(const ImageView& image, const BodyResult& body,
+                                      std::span<const BodyMark> marks) {
+  cv::Mat picture = colour_copy(image);
+  for (const BodyPoint& point : body.points)
+    draw(picture, {{}, Eigen::Vector3d::Zero(), point.u_px, point.covariance_px2, point.diameter_px},
+         marks[point.mark].name);
+  if (!body.reason.empty())
+    write_text(picture, body.reason, {4, 14}, body.status == BodyStatus::found ? blue : red);
   return png_of(picture);
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "measure/board.h"
+#include "measure/body.h"
 #include "measure/image.h"
 #include "measure/marks.h"
 
@@ -25,5 +26,9 @@ std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const Ma
 // PNG bytes: the points of a board in green, each with row.column, joined in their order by blue lines (red
 // from one row to the next), and the reason, if there is one.
 std::vector<std::uint8_t> overlay_png(const ImageView& image, const BoardResult& board);
+
+// PNG bytes: the marks of a calibration body in green, each with its name.
+std::vector<std::uint8_t> overlay_png(const ImageView& image, const BodyResult& body,
+                                      std::span<const BodyMark> marks);
 
 }  // namespace zeropose

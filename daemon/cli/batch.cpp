@@ -18,10 +18,13 @@
 #include "daemon/cli/convert.h"
 #include "daemon/cli/find.h"
 #include "daemon/cli/find_board.h"
+#include "daemon/cli/find_body.h"
+#include "daemon/cli/frame.h"
 #include "daemon/cli/help.h"
 #include "daemon/cli/plan.h"
 #include "daemon/cli/recalibrate.h"
 #include "daemon/cli/triangulate.h"
+#include "daemon/cli/verify.h"
 #include "measure/pose.h"
 
 namespace zeropose {
@@ -282,8 +285,11 @@ void add_batch_verbs(CLI::App& app, int& exit_status) {
   add_convert(app, exit_status);
   add_find(app, exit_status);
   add_find_board(app, exit_status);
+  add_find_body(app, exit_status);
+  add_frame(app, exit_status);
   add_plan(app, exit_status);
   add_triangulate(app, exit_status);
+  add_verify(app, exit_status);
   add_recalibrate(app, exit_status);
   add_calibration(app, exit_status);
 }

@@ -17,6 +17,8 @@ void add_calibrate(CLI::App& app, int& exit_status) {
   add_calibrate_tool(*verb, exit_status);
   add_calibrate_ball(*verb, exit_status);
   add_calibrate_hand_eye(*verb, exit_status);
+  add_calibrate_body(*verb, exit_status);
+  add_calibrate_sensor(*verb, exit_status);
 }
 
 }  // namespace zeropose

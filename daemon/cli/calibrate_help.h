@@ -17,6 +17,7 @@ search, then the refinement, then points that do not fit are thrown out.
   A board on the desk            one plane: turn it (views), or accept what one plane cannot tell
   Accurate guidance              points with depth over the whole image, all of the above: calibrate points
   Several boards or cameras      calibrate views
+  A picture of a calibration body calibrate body
   Internals known, camera put up calibrate pose
   A robot in place of a board    calibrate tool, then calibrate ball
   A camera on or before a robot  calibrate hand-eye: a board seen at several poses of the hand

@@ -13,6 +13,7 @@
 #include "config/cameras.h"
 #include "config/csv.h"
 #include "config/files.h"
+#include "config/sensor_tables.h"
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibration_answer.h"
@@ -33,6 +34,8 @@ is then corrected (nx ny nz: its normal, else 0 0 1).
 --start takes size, model and start values of the cameras that it names from a file of cameras
 ({"name": camera, ...}, or one camera alone); --fix holds parameters there, and without a start the origin in the
 image centre and lens coefficients at 0. Parameters: fx fy cx cy, K (division), k1 k2 p1 p2 k3 (brown).
+--poses: known X_WB of views (a linear stage, a robot); they are held and their frame is that of all poses. The board
+must then be parallel to itself and the stage's axes those of the table: what is not shows in the deviations.
 Example: points.csv
   view, x_mm, y_mm, u_px, v_px
   1, 0, 0, 211.32, 145.90
@@ -46,7 +49,7 @@ struct ViewsOptions {
   std::string points;
   int width_px = 0, height_px = 0;
   std::string model = "division";
-  std::optional<std::string> start, fix, report;
+  std::optional<std::string> start, fix, report, poses;
   bool one_focal = false;
   double sigma_px = 0, reject_px = 0, robust = 0;
   bool json = false;
@@ -144,8 +147,12 @@ void add_cameras(Json& json, const CalibrationViews& input, const ViewsResult& r
   json["camera_rms_px"] = rms;
 }
 
-Json views_json(const CalibrationViews& input, const ViewsResult& result) {
-  const std::string pose = input.cameras.size() > 1 ? "X_WB" : "X_CB";
+// Of the views: with one camera that nothing else holds, the world is the camera.
+const char* pose_name(const CalibrationViews& input, bool known_poses) {
+  return input.cameras.size() > 1 || known_poses ? "X_WB" : "X_CB";
+}
+
+Json views_json(const CalibrationViews& input, const ViewsResult& result, const std::string& pose) {
   Json views = Json::array();
   for (std::size_t v = 0; v < result.views.size(); ++v)
     views.push_back({{"view", input.views[v]},
@@ -173,11 +180,11 @@ Json deviations_json(const CalibrationViews& input, const ViewsResult& result) {
   return deviations;
 }
 
-Json json_of_result(const CalibrationViews& input, const ViewsResult& result) {
+Json json_of_result(const CalibrationViews& input, const ViewsResult& result, const char* pose) {
   Json json{{"status", name_of(result.status)}, {"reason", result.reason}};
   if (result.status != CalibrationStatus::ok) return json;
   add_cameras(json, input, result);
-  json["views"] = views_json(input, result);
+  json["views"] = views_json(input, result, pose);
   json["rms_px"] = result.rms_px;
   json["sigma_px"] = result.sigma_px;
   json["residual_sum"] = result.residual_sum;
@@ -190,7 +197,7 @@ Json json_of_result(const CalibrationViews& input, const ViewsResult& result) {
   return json;
 }
 
-std::string text_of_result(const CalibrationViews& input, const ViewsResult& result) {
+std::string text_of_result(const CalibrationViews& input, const ViewsResult& result, const char* pose) {
   if (result.status != CalibrationStatus::ok)
     return concat({"no answer (", name_of(result.status), "): ", result.reason, "\n"});
   std::ostringstream text;
@@ -199,7 +206,7 @@ std::string text_of_result(const CalibrationViews& input, const ViewsResult& res
     text << input.cameras[c] << ":\n  " << cameras.at(input.cameras[c]).dump() << "\n  sigma "
          << sigma_json(internals_of(result, c)).dump() << "\n";
   }
-  text << (input.cameras.size() > 1 ? "X_WB" : "X_CB") << " of the views, mm and degrees, and rms, px:\n";
+  text << pose << " of the views, mm and degrees, and rms, px:\n";
   for (std::size_t v = 0; v < result.views.size(); ++v)
     text << table_of(six_of(result.views[v].X_WB)) << table_of({&result.views[v].rms_px, 1}) << "  "
          << input.views[v] << "\n";
@@ -224,6 +231,17 @@ void write_pages(const std::filesystem::path& file, const std::filesystem::path&
   }
 }
 
+// Views without a line in the table keep their unknown pose; a line without a view is a slip of the pen.
+void add_known_poses(const std::string& file, std::vector<BoardView>& views) {
+  for (const auto& [name, X_WB] : load_named_poses(file)) {
+    const auto view = std::find_if(views.begin(), views.end(),
+                                   [&, &wanted = name](const BoardView& one) { return one.name == wanted; });
+    if (view == views.end())
+      throw ConfigError({concat({file, ": found view ", in_quotes(name), ", which has no points"})});
+    view->X_WB = X_WB;
+  }
+}
+
 Answer calibrate_views_of(const ViewsOptions& options) {
   const CalibrationViews input = load_calibration_views(options.points);
   if (input.points.empty())
@@ -232,6 +250,7 @@ Answer calibrate_views_of(const ViewsOptions& options) {
   const std::vector<ViewsCamera> cameras = cameras_of(options, input.cameras);
   std::vector<BoardView> views;
   for (const std::string& name : input.views) views.push_back({name, std::nullopt});
+  if (options.poses) add_known_poses(*options.poses, views);
   ViewsProblem problem;
   problem.cameras = cameras, problem.views = views, problem.points = input.points;
   problem.sigma_px = options.sigma_px, problem.reject_px = options.reject_px, problem.robust = options.robust;
@@ -243,8 +262,9 @@ Answer calibrate_views_of(const ViewsOptions& options) {
   const ViewsResult result = calibrate_views(problem);
   if (options.report && result.status == CalibrationStatus::ok)
     write_pages(*options.report, options.points, input, problem, result);
-  return {result.status == CalibrationStatus::ok ? done : no_answer, json_of_result(input, result),
-          text_of_result(input, result)};
+  const char* pose = pose_name(input, options.poses.has_value());
+  return {result.status == CalibrationStatus::ok ? done : no_answer, json_of_result(input, result, pose),
+          text_of_result(input, result, pose)};
 }
 
 void add_options(CLI::App& verb, ViewsOptions& options) {
@@ -256,6 +276,9 @@ void add_options(CLI::App& verb, ViewsOptions& options) {
   verb.add_option("--model", options.model, "the lens: division or brown (division)")
       ->check(CLI::IsMember({"division", "brown"}));
   verb.add_option("--start", options.start, "a file of cameras to begin with");
+  verb.add_option(
+      "--poses", options.poses,
+      "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, known X_WB (stage, robot): the frame of all poses");
   verb.add_option("--fix", options.fix, "parameters to hold, parted by commas, e.g. p1,p2,k3");
   verb.add_flag("--one-focal", options.one_focal, "fx = fy");
   verb.add_option("--sigma-px", options.sigma_px, "of one pixel coordinate; without it from the residuals")
