@@ -154,7 +154,8 @@ void Painter::paint(const Thing& thing, const Pose& X_CS) {
   const Plane plane(X_CS);
   const CameraModel& camera = rays_.camera();
   const PixelBox box = reach_of(thing, X_CS, camera, edge_sigmas * edge_sigma_px_);
-  const double mm_per_px = X_CS.translation().z() / camera.fx_px;
+  const Vector3d middle_C_mm = X_CS * Vector3d(thing.shape.centre_mm.x(), thing.shape.centre_mm.y(), 0);
+  const double mm_per_px = middle_C_mm.z() / camera.fx_px;  // above 0 where the box is not empty
   const double sigma_mm = std::hypot(edge_sigma_px_ * mm_per_px, thing.paint.softness_mm);
   const double edge_mm = edge_sigmas * sigma_mm;
   const double deep_mm = std::max(edge_mm, thing.paint.bevel_mm);
