@@ -174,7 +174,9 @@ Answer calibrate_ball(const BallOptions& options) {
   for (std::string& warning : warnings_of(places, result))
     result.diagnosis.warnings.push_back(std::move(warning));
   if (!good || !doubt.empty()) return no_camera(std::move(result), doubt);
-  Answer answer = answer_of(options.points, *input, result, "A robot's ball: " + options.pixels);
+  PointsOptions points = options.points;
+  points.on_hand = places.in_hand;
+  Answer answer = answer_of(points, *input, result, "A robot's ball: " + options.pixels);
   add_robot_poses(places, result, answer);
   return answer;
 }

@@ -1,12 +1,16 @@
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <sstream>
 
 #include "calib/hand_eye.h"
+#include "config/atomic_file.h"
 #include "config/camera_file.h"
 #include "config/robot_tables.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/convert.h"
+#include "daemon/cli/output.h"
 #include "daemon/cli/robot_answer.h"
 
 namespace zeropose {
@@ -29,14 +33,16 @@ The noise of the robot's poses is estimated from how the views disagree, or give
 --robot-sigma-deg. A view that contradicts the others is left out and named when it is clear which one; else the
 candidates are named. views: where a view alone puts the board beside where robot and answer put it (error_mm, error_deg).
 scale: by which the board's coordinates would fit better, a diagnosis of a wrong pitch; it is not applied.
+--output writes the camera, ready for zeropose calibration activate.
 Example:
   zeropose calibrate hand-eye --setup eye-to-hand --robot robot.csv --points points.csv --camera camera.json --json
 Exit status: 0 done, 1 the views cannot give an answer (status and reason say why), 2 wrong usage or unreadable input.)";
 
 struct HandEyeOptions {
-  std::string setup, robot, points, camera, name;
+  std::string setup, robot, points, camera, name, output;
+  std::optional<std::string> X_WR;
   double sigma_px = 0, robot_sigma_mm = 0, robot_sigma_deg = 0;
-  bool json = false;
+  bool replace = false, json = false;
 };
 
 bool in_hand(const HandEyeOptions& options) { return options.setup == "eye-in-hand"; }
@@ -131,6 +137,16 @@ std::string hand_eye_text(const HandEyeOptions& options, const std::vector<HandE
   return text.str() + warnings_text(result.warnings);
 }
 
+// Before the hand its place in the robot's base is that in the world only where the two are one.
+void write_camera(const HandEyeOptions& options, const CameraFile& internals, const HandEyeResult& result) {
+  const std::optional<Pose> X_WR = pose_of_option(options.X_WR, "--X-WR");
+  CameraFile camera = internals;
+  camera.has_pose = true;
+  camera.camera.on_hand = in_hand(options);
+  camera.camera.X_WC = in_hand(options) ? result.X_FC : X_WR.value_or(Pose::Identity()) * result.X_FC;
+  replace_file(options.output, camera_file_text(camera));
+}
+
 Answer calibrate_hand_eye_of(const HandEyeOptions& options) {
   const CameraFile camera = load_camera(options.camera, options.name);
   const std::vector<HandEyeView> views = load_hand_eye_views(options.robot, options.points);
@@ -141,8 +157,11 @@ Answer calibrate_hand_eye_of(const HandEyeOptions& options) {
   problem.sigma_px = options.sigma_px;
   problem.robot_sigma_mm = options.robot_sigma_mm;
   problem.robot_sigma_deg = options.robot_sigma_deg;
+  if (!options.output.empty()) refuse_existing(options.output, options.replace);
   const HandEyeResult result = calibrate_hand_eye(problem);
-  return {result.status == HandEyeStatus::ok ? done : no_answer, hand_eye_json(options, views, result),
+  const bool good = result.status == HandEyeStatus::ok;
+  if (good && !options.output.empty()) write_camera(options, camera, result);
+  return {good ? done : no_answer, hand_eye_json(options, views, result),
           hand_eye_text(options, views, result)};
 }
 
@@ -168,6 +187,10 @@ void add_options(CLI::App& verb, HandEyeOptions& options) {
       verb.add_option("--robot-sigma-deg", options.robot_sigma_deg, "of the hand's turn about one axis")
           ->check(CLI::Range(1e-6, 10.0));
   mm->needs(deg), deg->needs(mm);
+  verb.add_option("--X-WR", options.X_WR,
+                  "x,y,z,rx,ry,rz of the robot's base in the world, for --output with eye-to-hand");
+  verb.add_option("--output", options.output, "camera JSON to write: with X_HC, or with X_WC = X_WR X_RC");
+  verb.add_flag("--replace", options.replace, "overwrite --output");
   verb.add_flag(
       "--json", options.json,
       "one JSON object on stdout: status, reason, X_HC and X_RB or X_RC and X_HB, sigma, covariance (6x6, "

@@ -41,6 +41,14 @@ TEST_F(CalibrationStore, KeepsWhatWasThereBefore) {
   EXPECT_EQ(active_entry(file)->number, 2);
 }
 
+TEST_F(CalibrationStore, HoldsWholeFiles) {
+  const std::string before = read_file(ZEROPOSE_SOURCE_DIR "/config/cells/car-body.calibration.json");
+  write(before);
+  activate("second");
+  EXPECT_EQ(undo().text, before);
+  EXPECT_EQ(now(), before);
+}
+
 TEST_F(CalibrationStore, UndoGoesBackStepByStepAndLosesNothing) {
   activate("second");
   activate("third");
