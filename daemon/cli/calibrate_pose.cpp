@@ -8,6 +8,7 @@
 #include "config/csv.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/output.h"
 
 namespace zeropose {
 namespace {
@@ -32,11 +33,11 @@ Exit status: 0 done, 1 the points cannot give an answer (status and reason say w
 unreadable input.)";
 
 struct PoseOnlyOptions {
-  std::string camera, name, points;
+  std::string camera, name, points, output;
   std::vector<std::string> features, features_world;
   std::optional<std::string> residual;
   double sigma_px = 0, feature_sigma_mm = HousingFeature{}.sigma_mm;
-  bool json = false;
+  bool replace = false, json = false;
 };
 
 Eigen::Vector3d three_numbers(const std::string& text, const std::string& option) {
@@ -129,7 +130,10 @@ Answer calibrate_pose_of(const PoseOnlyOptions& options) {
   problem.sigma_px = options.sigma_px;
   const std::string residual = options.residual.value_or(features.empty() ? "reprojection" : "algebraic");
   problem.residual = residual == "algebraic" ? Residual::algebraic : Residual::reprojection;
+  if (!options.output.empty()) refuse_existing(options.output, options.replace);
   const PoseOnlyResult result = calibrate_pose(problem);
+  if (result.status == PoseOnlyStatus::ok && !options.output.empty())
+    write_moved_camera(options.output, camera, result.X_WC);
   return {result.status == PoseOnlyStatus::ok ? done : no_answer, answer_json(points, result),
           answer_text(result)};
 }
@@ -142,6 +146,8 @@ void add_calibrate_pose(CLI::App& calibrate, int& exit_status) {
       calibrate.add_subcommand("pose", "X_WC of a camera whose internals are known, from measured points");
   verb->add_option("--camera", options->camera, "JSON of the camera: its internals")->required();
   verb->add_option("--name", options->name, "of the camera, where the file holds several");
+  verb->add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
+  verb->add_flag("--replace", options->replace, "overwrite --output");
   verb->add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px [suu svv suv]");
   verb->add_option("--feature", options->features,
                    "FX,FY,FZ of a point on the housing, in the camera's frame")

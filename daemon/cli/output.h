@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "config/atomic_file.h"
+#include "config/camera_file.h"
 #include "config/text.h"
 
 namespace zeropose::cli {
@@ -17,6 +19,14 @@ inline void refuse_existing(const std::filesystem::path& path, bool replace) {
     throw std::invalid_argument(
         concat({path.string(), ": the file exists; another name, or --replace (the old one is kept as ",
                 path.string(), ".previous)"}));
+}
+
+// The camera with another pose in the world, ready for `zeropose calibration activate`.
+inline void write_moved_camera(const std::filesystem::path& path, CameraFile camera, const Pose& X_WC) {
+  camera.has_pose = true;
+  camera.camera.on_hand = false;
+  camera.camera.X_WC = X_WC;
+  replace_file(path, camera_file_text(camera));
 }
 
 }  // namespace zeropose::cli

@@ -117,7 +117,8 @@ void write_files(const PointsOptions& options, const CalibrationReport& report, 
   if (!options.report.empty()) write(options.report, calibration_page(report));
   if (!options.report_json.empty()) write(options.report_json, answer.json.dump(1) + "\n");
   if (!options.output.empty())
-    write(options.output, camera_file_text({{options.name, report.result.model, report.result.X_WC, options.on_hand}, true}));
+    write(options.output,
+          camera_file_text({{options.name, report.result.model, report.result.X_WC, options.on_hand}, true}));
 }
 
 }  // namespace

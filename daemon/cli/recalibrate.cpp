@@ -8,6 +8,7 @@
 #include "config/camera_file.h"
 #include "config/recalibration_tables.h"
 #include "daemon/cli/answer.h"
+#include "daemon/cli/output.h"
 #include "measure/recalibration.h"
 
 namespace zeropose {
@@ -36,9 +37,9 @@ Exit status: 0 done, 1 the points cannot give an answer (status and reason say w
 unreadable input.)";
 
 struct RecalibrateOptions {
-  std::string method, camera, name, before, after, points;
+  std::string method, camera, name, before, after, points, output;
   double sigma_px = 0;
-  bool json = false;
+  bool replace = false, json = false;
 };
 
 RecalibrationMethod method_of(const std::string& name) {
@@ -160,7 +161,10 @@ Answer recalibrate_camera(const RecalibrateOptions& options) {
   const auto points =
       load_recalibration_points(problem.method, {options.before, options.after, options.points});
   problem.points = points;
+  if (!options.output.empty()) refuse_existing(options.output, options.replace);
   const RecalibrationResult result = recalibrate(problem);
+  if (result.code == Code::ok && !options.output.empty())
+    write_moved_camera(options.output, camera, result.X_WCn);
   return {result.code == Code::ok ? done : no_answer, answer_json(problem, result),
           answer_text(problem, result)};
 }
@@ -177,6 +181,8 @@ void add_recalibrate(CLI::App& app, int& exit_status) {
   verb->add_option("--camera", options->camera, "JSON of the camera as calibrated, with its X_WC")
       ->required();
   verb->add_option("--name", options->name, "of the camera, where the file holds several");
+  verb->add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
+  verb->add_flag("--replace", options->replace, "overwrite --output");
   verb->add_option("--before", options->before, "CSV: point [group] u_px v_px before it was moved")
       ->required();
   verb->add_option("--after", options->after, "CSV: the same points after")->required();

@@ -100,6 +100,14 @@ class Recalibrate(Case):
         self.assertEqual(status, 0)
         self.assertIn("9.8600", out)
 
+    def test_the_camera_is_written_for_activation(self):
+        arguments = [*self.arguments("known", *self.pixels(CHANGE), self.world()), "--output", self.path("new.json")]
+        _, answer, _ = run_json(*arguments)
+        written = json.loads(self.path("new.json").read_text())
+        self.expect_near(written["X_WC"], answer["X_WC"], 1e-9)
+        self.assertEqual(written["fx"], CAMERA["fx"])
+        self.expect_refused(run(*arguments), "new.json: the file exists")
+
     def test_arbitrary_points(self):
         status, answer, _ = run_json(*self.arguments("arbitrary", *self.pixels(TURN)))
         self.assertEqual(status, 0)

@@ -148,6 +148,14 @@ class HandEye(RobotCase):
             self.assertEqual([len(row) for row in answer["covariance"][camera]], [6] * 6)
             self.assertIn(camera, run(*self.scene(setup))[1])
 
+    def test_the_camera_is_written_where_it_hangs(self):
+        for setup, key, base in (("eye-in-hand", "X_HC", []), ("eye-to-hand", "X_WC", ["--X-WR", "0,0,0,0,0,0"])):
+            output = self.path(setup + ".json")
+            _, answer, _ = run_json(*self.scene(setup), *base, "--output", output)
+            written = json.loads(output.read_text())
+            self.assertEqual([pose for pose in ("X_HC", "X_WC") if pose in written], [key])
+            self.expect_near(written[key], answer["X_HC" if setup == "eye-in-hand" else "X_RC"], 1e-9)
+
     def test_inverted_poses_and_units(self):
         status, answer, _ = run_json(*self.scene("eye-to-hand", change=lambda row: six(inverse(matrix(row)))))
         self.assertEqual((status, answer["X_RC"]), (1, None))
@@ -243,6 +251,8 @@ class Ball(RobotCase):
         self.assertEqual((status, answer["status"]), (0, "ok"), answer["reason"])
         self.expect_near(answer["X_HC"], X_HC, 1e-3)
         self.assertAlmostEqual(answer["camera"]["fx"], 1930, delta=1e-3)
+        run_json(*arguments, "--output", self.path("camera.json"))
+        self.expect_near(json.loads(self.path("camera.json").read_text())["X_HC"], X_HC, 1e-3)
 
     def test_outlines_of_a_large_ball(self):
         X_HC, arguments = self.places(radius=40.0)
