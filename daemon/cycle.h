@@ -51,6 +51,7 @@ struct Snapshot {
 struct SurveyState {
   std::optional<Survey> survey;  // none runs
   std::string last_problem;      // of the last position that was told; empty: it was taken
+  TimePoint asked{};             // when it was last asked for
 };
 
 struct CameraStatus {
@@ -97,7 +98,8 @@ class Cycle {
   ZeroOutcome zero_now();
   Snapshot snapshot_now(std::size_t camera);
 
-  // While a survey runs AtPosition belongs to it. A new one takes the place of the old one.
+  // While a survey runs AtPosition belongs to it. A new one takes the place of the old one. One that nobody
+  // asks for any more ends by itself.
   void start_survey(const SurveyOptions& options);
   // What it has gathered, and the last position that was not taken.
   SurveyState survey_now();

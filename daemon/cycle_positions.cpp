@@ -5,7 +5,19 @@
 
 namespace zeropose {
 
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds forgotten_after{30};
+
+}  // namespace
+
 Code Cycle::at_position(const Request& request) {
+  if (survey_.survey && Clock::now() - survey_.asked > forgotten_after) {
+    spdlog::warn("the survey ends: nobody asked for it for {} s", forgotten_after.count());
+    survey_ = {};
+  }
   const Told told = survey_.survey ? look_for_survey(request) : look_from_hand(request);
   spdlog::info("{} request {}: position {} of part {}: code {} {}{}", cell_.robots.at(request.robot).name,
                request.id, request.argument, request.part, static_cast<int>(told.code),
@@ -40,11 +52,14 @@ Cycle::Told Cycle::look_for_survey(const Request& request) {
 }
 
 void Cycle::start_survey(const SurveyOptions& options) {
-  run_between<bool>([this, options] { return survey_ = {Survey(options), {}}, true; });
+  run_between<bool>([this, options] { return survey_ = {Survey(options), {}, Clock::now()}, true; });
 }
 
 SurveyState Cycle::survey_now() {
-  return run_between<SurveyState>([this] { return survey_; });
+  return run_between<SurveyState>([this] {
+    survey_.asked = Clock::now();
+    return survey_;
+  });
 }
 
 void Cycle::end_survey() {

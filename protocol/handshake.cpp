@@ -267,7 +267,9 @@ CommandOutcome Handshake::at_position(const Command& command, ConnectionId from,
 
 Request Handshake::request_of(const Command& command, TimePoint now) {
   const auto kind = static_cast<CommandKind>(command.kind);
-  const auto time = kind == CommandKind::zero ? options_.zero_deadline : options_.measure_deadline;
+  // At a position a board may be looked for; nobody waits there for a correction.
+  const bool unhurried = kind == CommandKind::zero || kind == CommandKind::at_position;
+  const auto time = unhurried ? options_.zero_deadline : options_.measure_deadline;
   Request request;
   request.robot = options_.robot;
   request.kind = kind;

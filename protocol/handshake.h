@@ -21,7 +21,7 @@ struct HandshakeOptions {
   std::uint32_t epoch = 1;                   // of the first session; different after every start, not 0
   std::chrono::milliseconds validity{2000};  // 1..65535
   std::chrono::milliseconds measure_deadline{500};
-  std::chrono::milliseconds zero_deadline{10000};
+  std::chrono::milliseconds zero_deadline{10000};  // of Zero and AtPosition
 };
 
 using ConnectionId = std::uint64_t;

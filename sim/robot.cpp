@@ -274,7 +274,7 @@ RobotAnswer SimulatedRobot::at_position(std::uint16_t job, std::uint32_t part, s
       write(position_reg::first,
             encode_position({static_cast<std::uint32_t>(position), *values}, options_.command_data_id));
   if (!told.ok()) return told;
-  return command(CommandKind::at_position, job, part, position, options_.patience);
+  return command(CommandKind::at_position, job, part, position, options_.zero_patience);
 }
 
 RobotAnswer SimulatedRobot::select_job(std::uint16_t job) {

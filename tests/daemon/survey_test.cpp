@@ -30,13 +30,14 @@ class BallSurvey : public testing::Test {
     for (const Vector2d& ball : balls_px) drawing.figures.push_back(test::ellipse(ball, 36, 1, 0, 60));
     return test::expose(test::paint(drawing), noise, random_);
   }
-  SurveyVerdict look(int position, const std::vector<Vector2d>& first, const std::vector<Vector2d>& second,
-                     const Pose& X_RH = Pose::Identity()) {
+  using Balls = std::vector<Vector2d>;
+  SurveyVerdict look_at(int position, const Balls& first, const Balls& second,
+                        const Pose& X_RH = Pose::Identity()) {
     const test::Pixels a = picture(first), b = picture(second);
     return survey.look(position, X_RH, a.view(), b.view());
   }
   SurveyVerdict look(int position, const Vector2d& ball, const Pose& X_RH = Pose::Identity()) {
-    return look(position, {ball}, {ball}, X_RH);
+    return look_at(position, {ball}, {ball}, X_RH);
   }
 
   Survey survey{options()};
@@ -64,7 +65,7 @@ TEST_F(BallSurvey, TheLastWordCounts) {
 }
 
 TEST_F(BallSurvey, ABallOutOfSightIsNotTaken) {
-  const SurveyVerdict verdict = look(1, {}, {});
+  const SurveyVerdict verdict = look_at(1, {}, {});
   EXPECT_EQ(verdict.code, Code::too_few_marks);
   EXPECT_THAT(verdict.reason, HasSubstr("no ball is in sight"));
   EXPECT_EQ(look(1, {295, 100}).code, Code::too_few_marks) << "half of it is beyond the picture";
@@ -72,16 +73,16 @@ TEST_F(BallSurvey, ABallOutOfSightIsNotTaken) {
 }
 
 TEST_F(BallSurvey, TwoBallsAreOneTooMany) {
-  const SurveyVerdict verdict = look(1, {{100, 100}, {200, 60}}, {{100, 100}, {200, 60}});
+  const SurveyVerdict verdict = look_at(1, {{100, 100}, {200, 60}}, {{100, 100}, {200, 60}});
   EXPECT_EQ(verdict.code, Code::too_few_marks);
   EXPECT_THAT(verdict.reason, HasSubstr("2 things in the picture pass for the ball"));
 }
 
 TEST_F(BallSurvey, ARobotThatStillMovesIsNamed) {
-  const SurveyVerdict verdict = look(1, {{100, 100}}, {{100.6, 100}});
+  const SurveyVerdict verdict = look_at(1, {{100, 100}}, {{100.6, 100}});
   EXPECT_EQ(verdict.code, Code::not_standing_still);
   EXPECT_THAT(verdict.reason, HasSubstr("moved by 0.6"));
-  EXPECT_EQ(look(1, {{100, 100}}, {{100.05, 100}}).code, Code::ok) << "less than the noise tells";
+  EXPECT_EQ(look_at(1, {{100, 100}}, {{100.05, 100}}).code, Code::ok) << "less than the noise tells";
 }
 
 TEST_F(BallSurvey, PositionsCountFromOne) {

@@ -291,6 +291,7 @@ TEST_F(AtPositionTest, CarriesThePoseThatWasWrittenBefore) {
   ASSERT_TRUE(outcome.request);
   EXPECT_EQ(outcome.request->kind, CommandKind::at_position);
   EXPECT_EQ(outcome.request->argument, 4);
+  EXPECT_EQ(outcome.request->deadline, now + options.zero_deadline);
   EXPECT_LT((outcome.request->X_RH.translation() - Eigen::Vector3d(700, -20, 900)).norm(), 1e-9);
   EXPECT_TRUE(block().has(status_bit::busy));
   report(ok_report(1));
