@@ -27,10 +27,10 @@ class HandCameras : public testing::Test {
 TEST_F(HandCameras, AreWhereTheRobotCarriesThem) {
   const Cell cell = parse_cell({json.dump(), "", calibration_text(), ""});
   const Job& job = cell.jobs.front();
-  ASSERT_EQ(job.positions.size(), 4u);
+  ASSERT_EQ(job.positions.size(), 8u);
   const auto taught = cameras_for(cell, job);
-  ASSERT_EQ(taught.size(), 5u);
-  EXPECT_EQ(taught[2].name, "hand at front right");
+  ASSERT_EQ(taught.size(), 9u);
+  EXPECT_EQ(taught[2].name, "hand at front left across");
   EXPECT_EQ(camera_name(cell, job, 0), "hand");
   std::vector<Pose> X_RH;
   for (const HandPosition& position : job.positions)
@@ -42,9 +42,9 @@ TEST_F(HandCameras, AreWhereTheRobotCarriesThem) {
     EXPECT_TRUE((X_WR * X_RH[i] * X_HC).isApprox(now[i + 1].X_WC, 1e-12));
     EXPECT_FALSE(now[i + 1].on_hand);
   }
-  // Mark 5 is the second one of the second position.
-  EXPECT_EQ(job.views[4].camera, 2u);
-  EXPECT_EQ(device_of(job, job.views[4].camera, 1), 0u);
+  // The second mark is the first one seen from the second position.
+  EXPECT_EQ(job.views[1].camera, 2u);
+  EXPECT_EQ(device_of(job, job.views[1].camera, 1), 0u);
 }
 
 TEST_F(HandCameras, HaveTheirPoseInTheHand) {
@@ -65,12 +65,13 @@ TEST_F(HandCameras, AreSeenFromPositionsOnly) {
 }
 
 TEST_F(HandCameras, PositionsAreToldApartAndUsed) {
-  job()["positions"][1]["name"] = "front left";
+  job()["positions"][1]["name"] = "front left along";
   EXPECT_THAT(mistakes(),
-              testing::Contains(
-                  HasSubstr("jobs[0].positions[1].name: found \"front left\", as in jobs[0].positions[0]")));
+              testing::Contains(HasSubstr(
+                  "jobs[0].positions[1].name: found \"front left along\", as in jobs[0].positions[0]")));
   job()["positions"][1]["name"] = "nowhere";
-  for (std::size_t mark : {3u, 4u, 5u}) job()["marks"][mark]["cameras"] = {"front left"};
+  for (Json& mark : job()["marks"])
+    if (mark["cameras"][0] == "front left across") mark["cameras"] = {"front left along"};
   EXPECT_THAT(mistakes(),
               ElementsAre(HasSubstr("jobs[0].positions[1].name: found \"nowhere\", expected a position "
                                     "that at least one mark names")));

@@ -23,6 +23,11 @@ class Hands : public testing::Test {
             const Pose& X_RH = Pose::Identity()) {
     hands.take(position, part, X_RH, frame(grey), 3);
   }
+  static constexpr std::size_t none = 99;
+  void take_all_but(std::size_t left_out, std::uint32_t part) {
+    for (std::size_t position = 0; position < job.positions.size(); ++position)
+      if (position != left_out) take(position, part);
+  }
   std::string missing(std::optional<std::uint32_t> part, TimePoint now = TimePoint(100s)) const {
     return hands.missing(job, part, now);
   }
@@ -33,9 +38,9 @@ class Hands : public testing::Test {
 };
 
 TEST_F(Hands, EveryPositionIsNeeded) {
-  EXPECT_THAT(missing(7), HasSubstr("from front left, front right, rear right, rear left"));
-  for (const std::size_t position : {0u, 1u, 3u}) take(position, 7);
-  EXPECT_EQ(missing(7), "no picture of this part from rear right");
+  EXPECT_THAT(missing(7), HasSubstr("from front left along, front left across, front right along"));
+  take_all_but(2, 7);
+  EXPECT_EQ(missing(7), "no picture of this part from front right along");
   EXPECT_EQ(hands.rounds(job), 0u);
   take(2, 7);
   EXPECT_EQ(missing(7), "");
@@ -46,22 +51,22 @@ TEST_F(Hands, EveryPositionIsNeeded) {
 }
 
 TEST_F(Hands, PicturesOfAnotherPartAreNoneAtAll) {
-  for (std::size_t position = 0; position < 4; ++position) take(position, 7);
+  take_all_but(none, 7);
   EXPECT_NE(missing(8), "");
   take(0, 8);
-  EXPECT_EQ(missing(8), "no picture of this part from front right, rear right, rear left");
+  EXPECT_THAT(missing(8), HasSubstr("from front left across, front right along"));
   EXPECT_NE(missing(7), "");
 }
 
 TEST_F(Hands, OldPicturesAreNamed) {
-  for (std::size_t position = 0; position < 4; ++position) take(position, 7);
+  take_all_but(none, 7);
   EXPECT_EQ(missing(7, TimePoint(129s)), "");
-  EXPECT_THAT(missing(7, TimePoint(131s)), HasSubstr("front left (too long ago)"));
+  EXPECT_THAT(missing(7, TimePoint(131s)), HasSubstr("front left along (too long ago)"));
 }
 
 TEST_F(Hands, RoundsAreKeptNewestFirstWhileTheHandComesBack) {
   for (std::uint8_t round = 1; round <= 5; ++round)
-    for (std::size_t position = 0; position < 4; ++position) take(position, 0, round);
+    for (std::size_t position = 0; position < job.positions.size(); ++position) take(position, 0, round);
   EXPECT_EQ(hands.rounds(job), 3u);
   EXPECT_EQ(hands.frames(job, 0)[2].row(0)[0], 5);
   EXPECT_EQ(hands.frames(job, 2)[2].row(1)[3], 3);
@@ -94,7 +99,7 @@ TEST_F(Standings, WhereItWasTaught) {
 TEST_F(Standings, ElsewhereIsRefusedWithTheNumbers) {
   request.X_RH.translation().x() += 1.1;
   EXPECT_EQ(standing().code, Code::wrong_position);
-  EXPECT_THAT(standing().reason, HasSubstr("the hand is 1.100 mm and 0.000 deg away from front right"));
+  EXPECT_THAT(standing().reason, HasSubstr("the hand is 1.100 mm and 0.000 deg away from front left across"));
   request.X_RH =
       moved(job.positions[1].X_RH, (Vector6() << 0, 0, 0, 0.6 / degrees_per_radian, 0, 0).finished());
   EXPECT_EQ(standing().code, Code::wrong_position);
