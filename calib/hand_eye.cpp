@@ -144,7 +144,9 @@ WrongPoints judge_views(const HandEyeProblem& problem, const std::vector<SeenVie
   WrongPoints wrong;
   wrong.agree = true;
   wrong.fit = std::move(fit);
-  if (!problem.reject_wrong_views || wrong.fit.status != PointFitStatus::ok) return wrong;
+  if (!problem.reject_wrong_views) return wrong;
+  wrong.agree = wrong.fit.status == PointFitStatus::ok;
+  if (!wrong.agree) return wrong;
   wrong = remove_wrong_points(std::move(wrong.fit), used, options);
   for (const std::size_t view : wrong.removed) result.removed.push_back(seen[view].index);
   for (const std::size_t view : wrong.suspects) result.suspects.push_back(seen[view].index);

@@ -104,6 +104,14 @@ CalibrationEntry activate_calibration(const fs::path& calibration, const std::st
   return entry;
 }
 
+std::optional<CalibrationEntry> entry_before(const fs::path& calibration) {
+  const std::vector<CalibrationEntry> history = calibration_history(calibration);
+  const auto now = entry_with(history, read_file(calibration));
+  const int before = now ? now->before : last_number(history);
+  if (before == 0) return std::nullopt;
+  return history.at(static_cast<std::size_t>(before - 1));
+}
+
 CalibrationEntry undo_calibration(const fs::path& calibration, const std::string& time_utc) {
   const CalibrationEntry now = present(calibration, time_utc);
   const std::vector<CalibrationEntry> history = calibration_history(calibration);

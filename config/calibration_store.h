@@ -33,6 +33,9 @@ std::optional<CalibrationEntry> active_entry(const std::filesystem::path& calibr
 CalibrationEntry activate_calibration(const std::filesystem::path& calibration, const std::string& text,
                                       const std::string& why, const std::string& time_utc);
 
+// What undo_calibration() would go back to; nullopt: nothing is known before.
+std::optional<CalibrationEntry> entry_before(const std::filesystem::path& calibration);
+
 // Goes back to what was active before. Throws ConfigError when nothing is known before.
 CalibrationEntry undo_calibration(const std::filesystem::path& calibration, const std::string& time_utc);
 

@@ -220,6 +220,14 @@ Cell load_cell(const std::filesystem::path& path) {
   return cell;
 }
 
+std::filesystem::path calibration_file_of(const std::filesystem::path& path) {
+  std::vector<std::string> mistakes;
+  std::string calibration;
+  read_cell_file(read_file(path), path.string(), calibration, mistakes);
+  if (calibration.empty()) throw ConfigError(std::move(mistakes));
+  return path.parent_path() / calibration;
+}
+
 std::vector<CalibratedCamera> cameras_for(const Cell& cell, const Job& job, std::span<const Pose> X_RH) {
   std::vector<CalibratedCamera> cameras = cell.calibration;
   for (std::size_t i = 0; i < job.positions.size(); ++i) {

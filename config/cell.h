@@ -51,6 +51,9 @@ struct Cell {
 // mistakes at once.
 Cell load_cell(const std::filesystem::path& path);
 
+// Where the calibration of a cell lies, also when that file cannot be read. Throws ConfigError.
+std::filesystem::path calibration_file_of(const std::filesystem::path& cell);
+
 // The same from the bytes of both files; the names are for messages. For tools and tests that hold no files.
 struct CellText {
   std::string cell, cell_name;

@@ -251,14 +251,17 @@ void check_robots(const Cell& cell, JsonReading& reading) {
   }
 }
 
-// Where the hand is comes with AtPosition, which CAN does not carry and which has no place for the axis.
+// Where the hand is comes with AtPosition, which only the Modbus servers take and which has no place for the
+// axis.
 void check_hands(const Cell& cell, JsonReading& reading) {
   for (std::size_t i = 0; i < cell.hand_of.size(); ++i) {
     if (!cell.hand_of[i]) continue;
     const RobotOptions& robot = cell.robots[*cell.hand_of[i]];
-    if (std::holds_alternative<CanOptions>(robot.link) || robot.axis)
+    const bool server = std::holds_alternative<ModbusTcpOptions>(robot.link) ||
+                        std::holds_alternative<ModbusRtuOptions>(robot.link);
+    if (!server || robot.axis)
       reading.add_mistake(path_of("cameras", i) + ".on_hand_of", in_quotes(robot.name),
-                          "a robot without a linear axis, on a link other than can");
+                          "a robot without a linear axis, on a link of type modbus-tcp or modbus-rtu");
   }
 }
 

@@ -191,6 +191,7 @@ Report Cycle::report_for(const Request& request) {
       RobotLink& link = *links_.at(request.robot);
       const RobotOptions& robot = cell_.robots.at(request.robot);
       const auto outcome = measure(request.part, request.deadline, [&] { link.exposure_done(request.id); });
+      hands_.forget();  // every picture counts once, whatever came of it
       const Measurement& m = outcome.measurement;
       report.code = m.code;
       report.effective_marks = m.pose.effective_marks;
@@ -215,6 +216,7 @@ Report Cycle::report_for(const Request& request) {
         return report;
       }
       const auto outcome = take_zero(request.part, request.deadline);
+      hands_.forget();
       report.code = outcome.code;
       return report;
     }
@@ -273,7 +275,6 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
   const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
   const auto images = images_of(grabbed.eyes, outcome.frames);
   const auto cameras = cameras_for(cell_, job, hands_.hands(job));
-  hands_.forget();  // every picture counts once
   m = zeropose::measure({images, job, cameras, zero->zero, X_O0O_last_, references, &trend_});
   remember(m.references);
   follow_health(health_, images, m, job, cell_);

@@ -1,15 +1,17 @@
 // What the cycle does with the positions that robots tell.
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+
 #include "daemon/cycle.h"
 
 namespace zeropose {
-
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::seconds forgotten_after{30};
+constexpr std::uint32_t zero_part = 0;  // as Zero has it: of several rounds
 
 }  // namespace
 
@@ -18,11 +20,12 @@ Code Cycle::at_position(const Request& request) {
     spdlog::warn("the survey ends: nobody asked for it for {} s", forgotten_after.count());
     survey_ = {};
   }
-  const Told told = survey_.survey ? look_for_survey(request) : look_from_hand(request);
+  const bool surveys = survey_.survey && survey_.robot.value_or(request.robot) == request.robot;
+  const Told told = surveys ? look_for_survey(request) : look_from_hand(request);
   spdlog::info("{} request {}: position {} of part {}: code {} {}{}", cell_.robots.at(request.robot).name,
                request.id, request.argument, request.part, static_cast<int>(told.code),
                text_of(told.code).name, told.reason.empty() ? "" : " (" + told.reason + ")");
-  if (survey_.survey) survey_.last_problem = told.reason;
+  if (surveys) survey_.last_problem = told.reason;
   return told.code;
 }
 
@@ -30,29 +33,43 @@ Cycle::Told Cycle::look_from_hand(const Request& request) {
   const Job& job = cell_.jobs[selected_];
   Standing standing = standing_of(cell_, job, request);
   if (standing.code != Code::ok) return {standing.code, std::move(standing.reason)};
-  const std::size_t camera[] = {job.positions[standing.position].camera};
-  FrameSet grabbed = grabber_.grab_live(camera, request.deadline - compute_reserve);
-  if (grabbed.code == Code::ok)
-    hands_.take(standing.position, request.part, request.X_RH, grabbed.frames.front(),
-                static_cast<std::size_t>(cell_.zero_frames));
-  return {grabbed.code, std::move(grabbed.reason)};
+  const auto oldest = Clock::now() - std::chrono::duration_cast<Clock::duration>(
+                                         std::chrono::duration<double>(job.positions_within_s));
+  const int rounds = request.part == zero_part ? cell_.zero_frames : 1;
+  hands_.make_room(standing.position, request.part, request.X_RH, oldest, static_cast<std::size_t>(rounds));
+  const FrameSet grabbed = grab_for(request, job.positions[standing.position].camera);
+  if (grabbed.code == Code::ok) hands_.take(standing.position, grabbed.frames.front());
+  return {grabbed.code, grabbed.reason};
+}
+
+// With the patience of a measurement: the deadline of a position is longer than the watchdog's.
+FrameSet Cycle::grab_for(const Request& request, std::size_t camera) {
+  last_progress_ = Clock::now();
+  const std::size_t cameras[] = {camera};
+  return grabber_.grab_live(cameras,
+                            std::min(request.deadline - compute_reserve, Clock::now() + cell_.deadline));
 }
 
 Cycle::Told Cycle::look_for_survey(const Request& request) {
-  const std::size_t camera[] = {survey_.survey->options().camera};
+  survey_.robot = request.robot;
   std::vector<Frame> frames;
   for (int picture = 0; picture < 2; ++picture) {
-    FrameSet grabbed = grabber_.grab_live(camera, request.deadline - compute_reserve);
+    FrameSet grabbed = grab_for(request, survey_.survey->options().camera);
     if (grabbed.code != Code::ok) return {grabbed.code, std::move(grabbed.reason)};
     frames.push_back(std::move(grabbed.frames.front()));
   }
+  last_progress_ = Clock::now();
   SurveyVerdict verdict =
       survey_.survey->look(request.argument, request.X_RH, view_of(frames[0]), view_of(frames[1]));
   return {verdict.code, std::move(verdict.reason)};
 }
 
 void Cycle::start_survey(const SurveyOptions& options) {
-  run_between<bool>([this, options] { return survey_ = {Survey(options), {}, Clock::now()}, true; });
+  run_between<bool>([this, options] {
+    hands_.forget();
+    survey_ = {Survey(options), {}, Clock::now(), {}};
+    return true;
+  });
 }
 
 SurveyState Cycle::survey_now() {

@@ -44,7 +44,6 @@ ZeroOutcome Cycle::take_zero(std::optional<std::uint32_t> part, TimePoint deadli
     observations.push_back(observations_of(findings, job));
     references.push_back(find_references(images, cell_.references, cell_.calibration));
   }
-  hands_.forget();
   ZeroResult result = make_zero(cameras, job, observations);
   if (result.code == Code::ok) {
     ReferenceZero fixed = average_references(cell_.references, cell_.calibration, references);

@@ -7,8 +7,8 @@
 namespace zeropose {
 namespace {
 
-// As exactly as a robot comes back, and more: pictures from there belong together.
-constexpr double same_hand_mm = 0.5, same_hand_deg = 0.05;
+// What a robot that was taught a position says of it twice: pictures from there belong together.
+constexpr double same_hand_mm = 0.1, same_hand_deg = 0.01;
 
 struct Distance {
   double mm = 0, deg = 0;
@@ -58,16 +58,21 @@ Standing standing_of(const Cell& cell, const Job& job, const Request& request) {
   return {Code::ok, {}, index};
 }
 
-void HandPictures::take(std::size_t position, std::uint32_t part, const Pose& X_RH, const Frame& frame,
-                        std::size_t rounds) {
+void HandPictures::make_room(std::size_t position, std::uint32_t part, const Pose& X_RH, TimePoint oldest,
+                             std::size_t rounds) {
   if (part != part_) places_.clear();
   part_ = part;
   Place& place = places_[position];
   const Distance off = distance(place.X_RH, X_RH);
   if (off.mm > same_hand_mm || off.deg > same_hand_deg) place.frames.clear();
-  place.X_RH = X_RH;
-  place.frames.push_back(kept(frame));
-  if (place.frames.size() > rounds) place.frames.erase(place.frames.begin());
+  if (place.frames.empty()) place.X_RH = X_RH;
+  std::erase_if(place.frames, [&](const Frame& frame) { return frame.received < oldest; });
+  const auto most = static_cast<std::ptrdiff_t>(rounds) - 1;
+  if (std::ssize(place.frames) > most) place.frames.erase(place.frames.begin(), place.frames.end() - most);
+}
+
+void HandPictures::take(std::size_t position, const Frame& frame) {
+  places_.at(position).frames.push_back(kept(frame));
 }
 
 std::string HandPictures::missing(const Job& job, std::optional<std::uint32_t> part, TimePoint now) const {
@@ -75,7 +80,7 @@ std::string HandPictures::missing(const Job& job, std::optional<std::uint32_t> p
   std::string names;
   for (std::size_t i = 0; i < job.positions.size(); ++i) {
     const auto place = places_.find(i);
-    const bool seen = place != places_.end() && (!part || *part == part_);
+    const bool seen = place != places_.end() && !place->second.frames.empty() && (!part || *part == part_);
     if (seen && place->second.frames.back().received >= oldest) continue;
     names += (names.empty() ? "" : ", ") + job.positions[i].name + (seen ? " (too long ago)" : "");
   }

@@ -29,10 +29,12 @@ Standing standing_of(const Cell& cell, const Job& job, const Request& at_positio
 // What the cameras on hands saw of one part. Not thread-safe.
 class HandPictures {
  public:
-  // Keeps the newest `rounds` pictures of every position. Those of another part go, and those of this
-  // position that were taken with the hand elsewhere.
-  void take(std::size_t position, std::uint32_t part, const Pose& X_RH, const Frame& frame,
-            std::size_t rounds);
+  // To be called before the picture is taken, so that none of before stays when that fails. Those of another
+  // part go, of this position those older than `oldest` and, but for the newest rounds - 1, all; and all of
+  // them when the hand was elsewhere.
+  void make_room(std::size_t position, std::uint32_t part, const Pose& X_RH, TimePoint oldest,
+                 std::size_t rounds);
+  void take(std::size_t position, const Frame& frame);
   void forget() { places_.clear(); }
 
   // Which positions have no picture of this part (none given: of the part that was looked at last) or too old

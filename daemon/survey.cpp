@@ -10,7 +10,7 @@ namespace {
 
 constexpr int most_positions = 1000;
 // Of the target between the two pictures: what a standing robot and the noise leave at most.
-constexpr double still_px = 0.15, still_sigmas = 5;
+constexpr double still_px = 0.15, still_sigmas = 4;
 
 struct Seen {
   std::vector<SurveyPoint> points;
@@ -52,21 +52,21 @@ Seen seen(const BoardTarget& target, const ImageView& image) {
 
 // How far the target wandered, by the points that both pictures show.
 std::string movement(const Seen& first, const Seen& second) {
-  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-  double variance = 0;
+  double squares = 0, variance = 0;
   int count = 0;
   for (const SurveyPoint& a : first.points)
     for (const SurveyPoint& b : second.points) {
       if (a.p_B_mm != b.p_B_mm) continue;
-      sum += b.u_px - a.u_px;
+      squares += (b.u_px - a.u_px).squaredNorm();
       variance += a.covariance_px2.trace() + b.covariance_px2.trace();
       ++count;
     }
   if (count == 0) return "the two pictures show nothing in common";
-  const double mean_px = sum.norm() / count, sigma_px = std::sqrt(variance) / count;
-  if (mean_px <= still_px + still_sigmas * sigma_px) return {};
+  // Of every point, since a board that turns about its middle has none on average.
+  const double moved_px = std::sqrt(squares / count), sigma_px = std::sqrt(variance / count);
+  if (moved_px <= still_px + (1 + still_sigmas / std::sqrt(count)) * sigma_px) return {};
   return fmt::format("the target moved by {:.2f} px between two pictures: the robot did not stand still",
-                     mean_px);
+                     moved_px);
 }
 
 }  // namespace

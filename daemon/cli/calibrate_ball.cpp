@@ -72,6 +72,10 @@ void refuse_wrong_centre(const BallOptions& options, bool in_hand) {
     throw std::invalid_argument("eye-to-hand: expected --tool (the ball's centre in the hand) and no --ball");
   if (in_hand && options.X_WR)
     throw std::invalid_argument("--X-WR: a camera on the hand has no pose of its own in the world");
+  if (!in_hand && !options.X_WR && !options.points.output.empty())
+    throw std::invalid_argument(
+        "--output with eye-to-hand: expected --X-WR, the robot's base in the world (0,0,0,0,0,0 where they "
+        "are one)");
 }
 
 BallPlaces places_of(const BallOptions& options) {
@@ -170,10 +174,11 @@ Answer calibrate_ball(const BallOptions& options) {
   CalibrationResult result = calibrate_balls(options.radius_mm, *input);
   const bool good = result.status == CalibrationStatus::ok;
   std::string doubt;
-  if (!good || result.rms_px > plausible_px) doubt = doubt_of(options, places);
+  const bool poor = result.rms_px > plausible_px;
+  if (!good || poor) doubt = doubt_of(options, places);
   for (std::string& warning : warnings_of(places, result))
     result.diagnosis.warnings.push_back(std::move(warning));
-  if (!good || !doubt.empty()) return no_camera(std::move(result), doubt);
+  if (!good || poor) return no_camera(std::move(result), doubt);
   PointsOptions points = options.points;
   points.on_hand = places.in_hand;
   Answer answer = answer_of(points, *input, result, "A robot's ball: " + options.pixels);

@@ -137,7 +137,18 @@ std::string hand_eye_text(const HandEyeOptions& options, const std::vector<HandE
   return text.str() + warnings_text(result.warnings);
 }
 
-// Before the hand its place in the robot's base is that in the world only where the two are one.
+// A camera's place in the robot's base must not pass for that in the world.
+void refuse_contradictions(const HandEyeOptions& options) {
+  if (in_hand(options) && options.X_WR)
+    throw std::invalid_argument("--X-WR: a camera on the hand has no pose of its own in the world");
+  if (options.output.empty()) return;
+  if (!in_hand(options) && !options.X_WR)
+    throw std::invalid_argument(
+        "--output with eye-to-hand: expected --X-WR, the robot's base in the world (0,0,0,0,0,0 where they "
+        "are one)");
+  refuse_existing(options.output, options.replace);
+}
+
 void write_camera(const HandEyeOptions& options, const CameraFile& internals, const HandEyeResult& result) {
   const std::optional<Pose> X_WR = pose_of_option(options.X_WR, "--X-WR");
   CameraFile camera = internals;
@@ -157,7 +168,7 @@ Answer calibrate_hand_eye_of(const HandEyeOptions& options) {
   problem.sigma_px = options.sigma_px;
   problem.robot_sigma_mm = options.robot_sigma_mm;
   problem.robot_sigma_deg = options.robot_sigma_deg;
-  if (!options.output.empty()) refuse_existing(options.output, options.replace);
+  refuse_contradictions(options);
   const HandEyeResult result = calibrate_hand_eye(problem);
   const bool good = result.status == HandEyeStatus::ok;
   if (good && !options.output.empty()) write_camera(options, camera, result);

@@ -1,15 +1,16 @@
 #include <chrono>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <memory>
 #include <sstream>
 #include <thread>
 
+#include "config/atomic_file.h"
 #include "config/config_error.h"
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/output.h"
 #include "daemon/control.h"
 #include "protocol/line_socket.h"
 
@@ -41,7 +42,7 @@ struct Options {
   std::string camera, target = "ball", robot, points;
   int positions = 0, rows = 0, cols = 0;
   double min_diameter_px = 0, max_diameter_px = 0, pitch_mm = 0, patience_s = 600;
-  bool bright = false, json = false;
+  bool bright = false, replace = false, json = false;
 };
 
 Json ask_daemon(const Options& options, const Json& question) {
@@ -114,22 +115,16 @@ std::string points_table(const Json& views, bool ball) {
   return text.str();
 }
 
-void write(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw ConfigError({concat({path, ": cannot be written"})});
-}
-
 Answer survey(const Options& options) {
+  for (const std::string& path : {options.robot, options.points}) refuse_existing(path, options.replace);
   ask_daemon(options, {{"cmd", "survey-start"},
                        {"camera", options.camera},
                        {"positions", options.positions},
                        {"target", target_of(options)}});
   std::cerr << "waiting for the robot to tell " << options.positions << " positions\n";
   const Json all = gathered(options);
-  write(options.robot, robot_table(all["views"]));
-  write(options.points, points_table(all["views"], options.target == "ball"));
+  replace_file(options.robot, robot_table(all["views"]));
+  replace_file(options.points, points_table(all["views"], options.target == "ball"));
   ask_daemon(options, {{"cmd", "survey-end"}});
   std::string missing;
   for (const Json& position : all["missing"])
@@ -171,6 +166,7 @@ void add_calibrate_survey(CLI::App& calibrate, int& exit_status) {
   verb->add_option("--pitch-mm", options->pitch_mm, "of a board");
   verb->add_option("--robot", options->robot, "the CSV of the hand's poses to write")->required();
   verb->add_option("--points", options->points, "the CSV of the pixels to write")->required();
+  verb->add_flag("--replace", options->replace, "overwrite these two");
   verb->add_option("--patience", options->patience_s, "seconds to wait for all positions")
       ->capture_default_str();
   verb->add_flag(

@@ -8,6 +8,7 @@
 #include "calib/comparison.h"
 #include "config/calibration_store.h"
 #include "config/camera_file.h"
+#include "config/cameras.h"
 #include "config/cell.h"
 #include "config/files.h"
 #include "config/records.h"
@@ -54,28 +55,28 @@ std::string entry_text(const CalibrationEntry& entry, bool active) {
 }
 
 Answer history_of(const Options& options) {
-  const Cell cell = load_cell(options.cell);
-  const auto active = active_entry(cell.calibration_file);
+  const std::filesystem::path file = calibration_file_of(options.cell);
+  const auto active = active_entry(file);
+  const std::string hash = hash_text(short_hash(read_file(file)));
   Answer answer;
-  answer.json = {{"status", "ok"},
-                 {"reason", ""},
-                 {"file", cell.calibration_file.string()},
-                 {"hash", hash_text(cell.calibration_hash)},
-                 {"entries", Json::array()}};
-  for (const CalibrationEntry& entry : calibration_history(cell.calibration_file)) {
+  answer.json = {
+      {"status", "ok"}, {"reason", ""}, {"file", file.string()}, {"hash", hash}, {"entries", Json::array()}};
+  for (const CalibrationEntry& entry : calibration_history(file)) {
     const bool now = active && active->number == entry.number;
     answer.json["entries"].push_back(entry_json(entry, now));
     answer.text += entry_text(entry, now);
   }
   if (!active)
-    answer.text += concat({"* ", cell.calibration_file.string(), "  ", hash_text(cell.calibration_hash),
-                           "  put there by hand, not by this command\n"});
+    answer.text += concat({"* ", file.string(), "  ", hash, "  put there by hand, not by this command\n"});
   return answer;
 }
 
 // The camera of the file in the place of the cell's.
 CalibratedCamera replacement(const Options& options, const CalibratedCamera& active) {
   const CameraFile file = load_camera(options.from, "");
+  if (!file.camera.name.empty() && file.camera.name != active.name)
+    throw ConfigError({concat({options.from, ": found camera ", in_quotes(file.camera.name), ", expected ",
+                               in_quotes(active.name), ": the camera that it takes the place of"})});
   if (!file.has_pose && !options.internals_only)
     throw ConfigError({concat({options.from, ": found no pose, expected ", active.on_hand ? "X_HC" : "X_WC",
                                "; with --internals-only the camera keeps the pose it has"})});
@@ -93,7 +94,9 @@ struct Change {
 constexpr double comparison_depth_mm = 2000;
 
 Change change_of(const Options& options, const Cell& cell) {
-  std::vector<CalibratedCamera> cameras = cell.calibration;
+  // All of the file: another cell may use it as well.
+  std::vector<CalibratedCamera> cameras =
+      parse_cameras(read_file(cell.calibration_file), cell.calibration_file.string());
   const auto active = std::ranges::find(cameras, options.camera, &CalibratedCamera::name);
   if (active == cameras.end()) {
     std::string names;
@@ -141,11 +144,12 @@ Answer activate(const Options& options) {
 }
 
 Answer undo(const Options& options) {
-  const Cell cell = load_cell(options.cell);
-  const auto active = active_entry(cell.calibration_file);
-  if (!active ? calibration_history(cell.calibration_file).empty() : active->before == 0)
-    return failure("there is nothing before the active calibration");
-  const CalibrationEntry entry = undo_calibration(cell.calibration_file, time_now());
+  const std::filesystem::path file = calibration_file_of(options.cell);
+  const auto before = entry_before(file);
+  if (!before) return failure("there is nothing before the active calibration");
+  parse_cell({read_file(options.cell), options.cell, before->text,
+              concat({"entry ", std::to_string(before->number)})});
+  const CalibrationEntry entry = undo_calibration(file, time_now());
   Answer answer;
   answer.json = {
       {"status", "ok"}, {"reason", ""}, {"entry", entry_json(entry, true)}, {"remedy", afterwards}};

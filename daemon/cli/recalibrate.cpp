@@ -53,6 +53,9 @@ void require_fitting_options(const RecalibrateOptions& options, const CameraFile
     throw std::invalid_argument("--points is required with --method " + options.method);
   if (arbitrary && !options.points.empty())
     throw std::invalid_argument("--points is not used with --method arbitrary, which takes no coordinates");
+  if (camera.camera.on_hand)
+    throw std::invalid_argument(
+        options.camera + ": the camera has X_HC, expected X_WC: one on a hand has no place of its own");
   if (!camera.has_pose)
     throw std::invalid_argument(options.camera +
                                 ": the camera has no X_WC, expected its pose before it moved");

@@ -307,12 +307,13 @@ INSTANTIATE_TEST_SUITE_P(
                 "jobs[0].application_points[3].name: found \"rear left\", as in "
                 "jobs[0].application_points[2], expected another one for each"},
         Mistake{"/jobs/0/marks/1/cameras", "[\"camera5\"]",
-                "jobs[0].marks[1].cameras[0]: found \"camera5\", expected the name of a camera of this cell"},
+                "jobs[0].marks[1].cameras[0]: found \"camera5\", expected the name of a fixed camera of this "
+                "cell, or of a position of this job"},
         Mistake{"/jobs/0/marks/1/cameras", "[\"camera1\", \"camera1\"]",
                 "jobs[0].marks[1].cameras[1]: found \"camera1\" twice, expected each camera once"},
         Mistake{"/jobs/0/marks/1/cameras", "[]",
-                "jobs[0].marks[1].cameras: found no camera, expected at least one name of a camera of this "
-                "cell"},
+                "jobs[0].marks[1].cameras: found no camera, expected the name of a fixed camera of this "
+                "cell, or of a position of this job"},
         Mistake{
             "/jobs/0/marks/1/normal", "[0, 0, 0.9]",
             "jobs[0].marks[1].normal: found a vector of length 0.900000, expected a unit vector (length 0.99 "

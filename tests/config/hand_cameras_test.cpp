@@ -88,7 +88,7 @@ TEST_F(HandCameras, NeedARobotThatCanTellWhereItsHandIs) {
   json["robots"][0]["axis"] = {{"direction", {1, 0, 0}}, {"zero_mm", 0}};
   EXPECT_THAT(mistakes(),
               ElementsAre(HasSubstr("cameras[0].on_hand_of: found \"robot1\", expected a robot without "
-                                    "a linear axis")));
+                                    "a linear axis, on a link of type modbus-tcp or modbus-rtu")));
 }
 
 }  // namespace

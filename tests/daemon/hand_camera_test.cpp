@@ -12,7 +12,8 @@ const std::filesystem::path cell_file = ZEROPOSE_SOURCE_DIR "/config/cells/hand-
 
 LineRobot robot_of(const Cell& cell) {
   const RobotOptions& robot = cell.robots.front();
-  return {std::get<ModbusTcpOptions>(robot.link).port, robot.convention, robot.X_WR};
+  return {std::get<ModbusTcpOptions>(robot.link).port, robot.convention, robot.X_WR,
+          cell.jobs.front().X_WO_nominal};
 }
 
 class HandCamera : public testing::Test {
@@ -28,9 +29,12 @@ class HandCamera : public testing::Test {
   // The hand stands where it was taught, and the robot says so. Returns the code.
   std::uint16_t look(std::size_t position, std::uint32_t part) {
     const Pose& X_RH = cell.jobs[0].positions[position].X_RH;
+    put_hand(X_RH);
+    return told(position, part, X_RH);
+  }
+  void put_hand(const Pose& X_RH) {
     const SixNumbers s = to_six_numbers(X_RH);
     line.ask_cell({{"cmd", "hand"}, {"pose", {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg}}});
-    return told(position, part, X_RH);
   }
   std::uint16_t told(std::size_t position, std::uint32_t part, const Pose& X_RH) {
     const RobotAnswer answer =
@@ -76,11 +80,24 @@ TEST_F(HandCamera, MeasuresAPartThatItSawFromAllPositions) {
   EXPECT_EQ(line.recorder().violations(), std::vector<std::string>{});
 }
 
-// The hand stands elsewhere than the robot says: the marks contradict each other, and nothing is valid.
-TEST_F(HandCamera, AHandThatIsNotWhereTheRobotSaysIsNoCorrection) {
-  for (std::size_t position = 0; position + 1 < positions; ++position) ASSERT_EQ(look(position, 51), 0);
-  ASSERT_EQ(told(positions - 1, 51, cell.jobs[0].positions[positions - 1].X_RH), 0);
-  EXPECT_NE(measured(51), 0);
+// The hand stands 3 mm beside what the robot says: its marks contradict those of the other positions.
+// Whatever comes of it, the recorder sees that it is not wrong.
+TEST_F(HandCamera, AHandThatIsNotWhereTheRobotSaysDoesNoHarm) {
+  for (std::size_t wrong = 0; wrong < positions; wrong += 3) {
+    const auto part = static_cast<std::uint32_t>(51 + wrong);
+    for (std::size_t position = 0; position < positions; ++position) {
+      const Pose& X_RH = cell.jobs[0].positions[position].X_RH;
+      Pose X_RH_true = X_RH;
+      if (position == wrong) X_RH_true.translation() += Eigen::Vector3d(3, 0, 0);
+      put_hand(X_RH_true);
+      ASSERT_EQ(told(position, part, X_RH), 0);
+    }
+    const RobotAnswer answer = line.measure(part);
+    if (answer.ok()) {
+      EXPECT_LE(answer.block.effective_marks, 21);
+      EXPECT_TRUE(line.acknowledge().ok());
+    }
+  }
   EXPECT_EQ(line.recorder().violations(), std::vector<std::string>{});
 }
 

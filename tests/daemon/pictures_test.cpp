@@ -21,7 +21,8 @@ class Hands : public testing::Test {
   }
   void take(std::size_t position, std::uint32_t part, std::uint8_t grey = 1,
             const Pose& X_RH = Pose::Identity()) {
-    hands.take(position, part, X_RH, frame(grey), 3);
+    hands.make_room(position, part, X_RH, TimePoint(50s), 3);
+    hands.take(position, frame(grey));
   }
   static constexpr std::size_t none = 99;
   void take_all_but(std::size_t left_out, std::uint32_t part) {
@@ -70,11 +71,28 @@ TEST_F(Hands, RoundsAreKeptNewestFirstWhileTheHandComesBack) {
   EXPECT_EQ(hands.rounds(job), 3u);
   EXPECT_EQ(hands.frames(job, 0)[2].row(0)[0], 5);
   EXPECT_EQ(hands.frames(job, 2)[2].row(1)[3], 3);
-  const Pose elsewhere = from_six_numbers({0.6, 0, 0, 0, 0, 0});
+  const Pose elsewhere = from_six_numbers({0.2, 0, 0, 0, 0, 0});
   take(2, 0, 9, elsewhere);
   EXPECT_EQ(hands.rounds(job), 1u);
   EXPECT_EQ(hands.frames(job, 0)[2].row(0)[0], 9);
   EXPECT_TRUE(hands.hands(job)[2].isApprox(elsewhere));
+}
+
+// What was seen before must not pass for what could not be seen now.
+TEST_F(Hands, APictureThatFailsLeavesNoneBehind) {
+  take_all_but(none, 7);
+  hands.make_room(2, 7, Pose::Identity(), TimePoint(50s), 1);
+  EXPECT_EQ(missing(7), "no picture of this part from front right along");
+}
+
+TEST_F(Hands, OldRoundsGo) {
+  hands.make_room(0, 0, Pose::Identity(), TimePoint(50s), 3);
+  hands.take(0, frame(1, TimePoint(60s)));
+  hands.make_room(0, 0, Pose::Identity(), TimePoint(70s), 3);
+  hands.take(0, frame(2));
+  take_all_but(0, 0);
+  EXPECT_EQ(hands.rounds(job), 1u);
+  EXPECT_EQ(hands.frames(job, 0)[0].row(0)[0], 2);
 }
 
 class Standings : public Hands {
@@ -111,7 +129,7 @@ TEST_F(Standings, OtherJobsIndicesAndCells) {
   request.job = 2;
   EXPECT_EQ(standing().code, Code::unknown_job);
   request.job = 1;
-  for (const std::int32_t index : {0, -1, 5}) {
+  for (const std::int32_t index : {0, -1, 9}) {
     request.argument = index;
     EXPECT_EQ(standing().code, Code::argument_out_of_range);
   }

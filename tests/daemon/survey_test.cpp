@@ -79,9 +79,9 @@ TEST_F(BallSurvey, TwoBallsAreOneTooMany) {
 }
 
 TEST_F(BallSurvey, ARobotThatStillMovesIsNamed) {
-  const SurveyVerdict verdict = look_at(1, {{100, 100}}, {{100.6, 100}});
+  const SurveyVerdict verdict = look_at(1, {{100, 100}}, {{100.9, 100}});
   EXPECT_EQ(verdict.code, Code::not_standing_still);
-  EXPECT_THAT(verdict.reason, HasSubstr("moved by 0.6"));
+  EXPECT_THAT(verdict.reason, HasSubstr("the target moved by"));
   EXPECT_EQ(look_at(1, {{100, 100}}, {{100.05, 100}}).code, Code::ok) << "less than the noise tells";
 }
 
@@ -114,6 +114,17 @@ TEST(BoardSurvey, TakesABoardThatLooksDifferentFromEverySide) {
   const SurveyVerdict verdict = look_at(scene, survey);
   ASSERT_EQ(verdict.code, Code::ok) << verdict.reason;
   EXPECT_EQ(survey.views().at(1).points.size(), 42u);
+}
+
+TEST(BoardSurvey, ABoardThatTurnsAboutItsMiddleMoves) {
+  const test::BoardScene scene = board(BoardKind::asymmetric_circles, 7);
+  test::BoardScene turned = scene;
+  turned.X_CB = test::board_pose(scene, 500, 0.3, 0.4, 0.212);
+  Survey survey({0, BoardTarget{scene.problem()}, 1});
+  std::mt19937_64 random(3);
+  const test::Pixels first = test::expose(test::paint(scene), noise, random),
+                     second = test::expose(test::paint(turned), noise, random);
+  EXPECT_EQ(survey.look(1, Pose::Identity(), first.view(), second.view()).code, Code::not_standing_still);
 }
 
 TEST(BoardSurvey, RefusesABoardWhoseFrameMayTurn) {

@@ -53,8 +53,8 @@ class WholeChain : public testing::Test {
     const auto running = daemon();
     ask({"status", "--wait", "30"});
     ask({"calibrate", "survey", "--camera", camera, "--positions", "27", "--target", "ball", "--bright",
-         "--min-diameter-px", "15", "--max-diameter-px", "90", "--robot", file("robot.csv"), "--points",
-         file("ball.csv")});
+         "--min-diameter-px", "15", "--max-diameter-px", "90", "--robot", file(camera + "-robot.csv"),
+         "--points", file(camera + "-ball.csv")});
     EXPECT_EQ(robot->wait(20s), 0);
     running->signal(SIGTERM);
     EXPECT_EQ(running->wait(20s), 0);
@@ -63,8 +63,8 @@ class WholeChain : public testing::Test {
   Json calibrated(const std::string& camera) const {
     const Finished answer = zeropose({"calibrate",   "ball",
                                       "--setup",     "eye-to-hand",
-                                      "--robot",     file("robot.csv"),
-                                      "--pixels",    file("ball.csv"),
+                                      "--robot",     file(camera + "-robot.csv"),
+                                      "--pixels",    file(camera + "-ball.csv"),
                                       "--tool",      "0,0,180",
                                       "--radius-mm", "30",
                                       "--width",     "1280",

@@ -91,7 +91,7 @@ void WalkingLine::take_zero() {
 RobotAnswer WalkingLine::measure(std::optional<std::uint32_t> part) {
   const std::uint32_t id = robot_.next_request_id();
   recorder_.requested(id);
-  recorder_.truth(id, correction_of(X_WO_), correction_error_mm(), 2 * line_error_deg);
+  recorder_.truth(id, correction_of(X_O0O_), correction_error_mm(), 2 * line_error_deg);
   return robot_.measure(1, part.value_or(id));
 }
 
@@ -112,9 +112,9 @@ Json WalkingLine::ask_daemon(const Json& question) const {
   return Json::parse(ask(folder_ / "zeropose.sock", question.dump(), 30s));
 }
 
-void WalkingLine::shift(const Pose& X_WO) {
-  X_WO_ = X_WO;
-  const SixNumbers s = to_six_numbers(X_WO);
+void WalkingLine::shift(const Pose& X_O0O) {
+  X_O0O_ = X_O0O;
+  const SixNumbers s = to_six_numbers(X_O0O);
   ask_cell({{"cmd", "shift"}, {"pose", {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg}}});
 }
 
@@ -130,18 +130,19 @@ Finished WalkingLine::zeropose(std::vector<std::string> arguments) const {
   return run_program(arguments);
 }
 
-Pose WalkingLine::correction_of(const Pose& X_WO) const {
-  const Pose& X_WR = line_robot_.X_WR;
-  return X_WR.inverse() * X_WO * X_WR;
+Pose WalkingLine::correction_of(const Pose& X_O0O) const {
+  const Pose X_RO0 = line_robot_.X_WR.inverse() * line_robot_.X_WO0;
+  return X_RO0 * X_O0O * X_RO0.inverse();
 }
 
 double WalkingLine::correction_error_mm() const {
-  return line_error_mm + line_robot_.X_WR.translation().norm() * line_error_deg / degrees_per_radian;
+  const double lever_mm = (line_robot_.X_WR.inverse() * line_robot_.X_WO0).translation().norm();
+  return line_error_mm + lever_mm * line_error_deg / degrees_per_radian;
 }
 
 Pose WalkingLine::shift_from(const Pose& D_R) const {
-  const Pose& X_WR = line_robot_.X_WR;
-  return X_WR * D_R * X_WR.inverse();
+  const Pose X_RO0 = line_robot_.X_WR.inverse() * line_robot_.X_WO0;
+  return X_RO0.inverse() * D_R * X_RO0;
 }
 
 std::string WalkingLine::daemon_log() const {

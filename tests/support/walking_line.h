@@ -26,6 +26,7 @@ struct LineRobot {
   std::uint16_t port = 1502;
   Convention convention = Convention::kuka;
   Pose X_WR = from_six_numbers({1200, -2400, -150, 0, 0, 90});
+  Pose X_WO0 = Pose::Identity();  // where the zero is taken
 };
 
 // Files live in `folder`: state/, control and notify sockets, logs.
@@ -40,7 +41,7 @@ class WalkingLine {
   int stop_daemon();        // SIGTERM; its exit status, -1 when it does not end
   void wait_until_alive();  // all cameras
   void take_zero();         // by the command line
-  void shift(const Pose& X_WO);
+  void shift(const Pose& X_O0O);
   nlohmann::json fault(const std::string& kind, const nlohmann::json& more = nlohmann::json::object());
   nlohmann::json ask_cell(const nlohmann::json& question) const;
   nlohmann::json ask_daemon(const nlohmann::json& question) const;
@@ -53,9 +54,9 @@ class WalkingLine {
   RobotAnswer acknowledge();
   // Watches from the first start of the daemon.
   Recorder& recorder() { return recorder_; }
-  // The robot-base shift that a robot must be sent for an object at X_WO, and how far it may be off: the
-  // error of the rotation moves the robot's origin, which lies away from the object's.
-  Pose correction_of(const Pose& X_WO) const;
+  // The robot-base shift that a robot must be sent for an object at X_O0O from its zero, and how far it may
+  // be off: the error of the rotation moves the robot's origin, which lies away from the object's.
+  Pose correction_of(const Pose& X_O0O) const;
   double correction_error_mm() const;
   // The robot-base shift that the robot was sent, as X_O0O.
   Pose shift_from(const Pose& D_R) const;
@@ -75,7 +76,7 @@ class WalkingLine {
   SimulatedRobot robot_;
   Recorder recorder_;
   bool watched_ = false;
-  Pose X_WO_ = Pose::Identity();  // where the object stands
+  Pose X_O0O_ = Pose::Identity();  // where the object stands
 };
 
 }  // namespace zeropose
