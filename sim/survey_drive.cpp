@@ -32,11 +32,11 @@ int drive_survey(const Cell& cell, const SurveyDrive& survey,
     show({X_WR * X_RH_true * survey.p_HT_mm, survey.radius_mm, survey.grey});
     return robot.at_position(static_cast<std::uint16_t>(cell.jobs.front().number), 0, position + 1, X_RH);
   };
+  // Somebody looks at the positions, whatever he sees.
   const auto begun = [&] {
     const RobotAnswer answer = go(0);
-    return answer.exception == 0 && answer.code != 0
-               ? answer.code != static_cast<std::uint16_t>(Code::no_procedure)
-               : answer.ok();
+    return answer.ok() || answer.code == static_cast<std::uint16_t>(Code::not_standing_still) ||
+           answer.code == static_cast<std::uint16_t>(Code::too_few_marks);
   };
   if (!done_within(begins_within_s, stop, begun)) {
     std::fprintf(stderr, "the robot waited %.0f s for a survey\n", begins_within_s);

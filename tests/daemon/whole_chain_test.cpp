@@ -55,7 +55,8 @@ class WholeChain : public testing::Test {
     ask({"calibrate", "survey", "--camera", camera, "--positions", "27", "--target", "ball", "--bright",
          "--min-diameter-px", "15", "--max-diameter-px", "90", "--robot", file(camera + "-robot.csv"),
          "--points", file(camera + "-ball.csv")});
-    EXPECT_EQ(robot->wait(20s), 0);
+    EXPECT_EQ(robot->wait(20s), 0) << text_of_file(folder / "cell.log")
+                                   << text_of_file(folder / "daemon.log");
     running->signal(SIGTERM);
     EXPECT_EQ(running->wait(20s), 0);
   }
