@@ -115,7 +115,7 @@ class Body(Case):
     def test_the_table_is_ready_for_calibrate(self):
         self.find("--csv", self.path("p.csv"))
         size = "--width", WIDTH, "--height", HEIGHT
-        status, points, _ = run_json("calibrate", "points", "--points", self.path("p.csv"), *size)
+        status, points, _ = run_json("calibrate", "points", "--points", self.path("p.csv"), *size, "--refine", "joint")
         self.assertEqual(status, 0)
         self.expect_camera(points, points["camera"]["X_WC"])
         status, body, _ = run_json("calibrate", "body", "--points", self.path("p.csv"), *size)

@@ -69,7 +69,7 @@ TEST_F(CellControl, NonsenseIsNamedAndChangesNothing) {
            {"[1, 2]", "not a JSON object"},
            {"{}", "'cmd' is missing"},
            {R"({"cmd": 5})", "'cmd' is missing or no text"},
-           {R"({"cmd": "jump"})", "no command 'jump'; there are: shift, truth, fault"},
+           {R"({"cmd": "jump"})", "no command 'jump'; there are: shift, hand, truth, fault"},
            {R"({"cmd": "shift"})", "'pose' must be"},
            {R"({"cmd": "shift", "pose": [1, 2, 3]})", "'pose' must be"},
            {R"({"cmd": "shift", "pose": [1, 2, 3, 4, 5, "6"]})", "no number"},
