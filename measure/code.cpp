@@ -40,9 +40,10 @@ constexpr std::array table{
              "The camera on the robot's hand has not looked at this part from all positions of the job.",
              "Let the robot tell every position by AtPosition, with the part's id, before Measure or Zero; "
              "each picture counts once."},
-    CodeText{Code::not_standing_still, "not_standing_still",
-             "What a camera looks at moved between two pictures of one position.",
-             "Let the robot wait until it has settled before it tells its position; look for play and vibration."},
+    CodeText{
+        Code::not_standing_still, "not_standing_still",
+        "What a camera looks at moved between two pictures of one position.",
+        "Let the robot wait until it has settled before it tells its position; look for play and vibration."},
 
     CodeText{Code::camera_missing, "camera_missing", "A camera of the job does not answer.",
              "Check its power, its network cable and the switch; the camera's name is in the reason."},
