@@ -32,7 +32,10 @@ Code Cycle::at_position(const Request& request) {
 Cycle::Told Cycle::look_from_hand(const Request& request) {
   const Job& job = cell_.jobs[selected_];
   Standing standing = standing_of(cell_, job, request);
-  if (standing.code != Code::ok) return {standing.code, std::move(standing.reason)};
+  if (standing.code != Code::ok) {
+    hands_.forget();  // a tour that goes wrong begins anew
+    return {standing.code, std::move(standing.reason)};
+  }
   const auto oldest = Clock::now() - std::chrono::duration_cast<Clock::duration>(
                                          std::chrono::duration<double>(job.positions_within_s));
   const int rounds = request.part == zero_part ? cell_.zero_frames : 1;

@@ -73,7 +73,9 @@ TEST_F(HandCamera, MeasuresAPartThatItSawFromAllPositions) {
   EXPECT_EQ(measured(42), code_of_missing);
   ASSERT_EQ(look(0, 43), 0) << "a picture of another part";
   EXPECT_EQ(measured(42), code_of_missing);
+  ASSERT_EQ(tour(44), 0);
   EXPECT_EQ(told(0, 44, cell.jobs[0].positions[1].X_RH), static_cast<std::uint16_t>(Code::wrong_position));
+  EXPECT_EQ(measured(44), code_of_missing) << "a refused position leaves no picture of before behind";
   line.shift(from_six_numbers({-9, 3, -12, -0.2, 0.2, -0.1}));
   ASSERT_EQ(tour(45), 0);
   EXPECT_EQ(measured(45), 0) << line.daemon_log();
