@@ -5,46 +5,16 @@
 
 #include "config/calibration_tables.h"
 #include "config/csv.h"
+#include "config/pose_table.h"
 #include "config/table_columns.h"
 #include "config/text.h"
 
 namespace zeropose {
-namespace {
-
-constexpr double largest_deg = 3600;
-
-Pose pose_of(CsvTable& table, std::size_t row) {
-  SixNumbers six;
-  six.x_mm = table.number(row, "x_mm", -largest_mm, largest_mm);
-  six.y_mm = table.number(row, "y_mm", -largest_mm, largest_mm);
-  six.z_mm = table.number(row, "z_mm", -largest_mm, largest_mm);
-  six.rx_deg = table.number(row, "rx_deg", -largest_deg, largest_deg);
-  six.ry_deg = table.number(row, "ry_deg", -largest_deg, largest_deg);
-  six.rz_deg = table.number(row, "rz_deg", -largest_deg, largest_deg);
-  return from_six_numbers(six);
-}
-
-void expect_once(CsvTable& table, std::size_t row, std::string_view column, std::set<std::string>& names) {
-  const std::string name = table.text(row, column);
-  if (!name.empty() && !names.insert(name).second)
-    table.add_mistake(row, column, in_quotes(name) + " again", concat({"each ", column, " once"}));
-}
-
-}  // namespace
 
 std::vector<HandPose> load_hand_poses(const std::filesystem::path& path, std::string_view column,
                                       bool required) {
-  CsvColumns columns{{"x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"}, {}};
-  (required ? columns.required : columns.optional).push_back(column);
-  CsvTable table = load_csv(path, columns);
   std::vector<HandPose> poses;
-  std::set<std::string> names;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const bool named = table.has(column);
-    poses.push_back({named ? table.text(row, column) : std::to_string(row + 1), pose_of(table, row)});
-    if (named) expect_once(table, row, column, names);
-  }
-  table.throw_if_wrong();
+  for (const auto& [name, X_RH] : load_named_poses(path, column, required)) poses.push_back({name, X_RH});
   return poses;
 }
 
@@ -77,7 +47,8 @@ std::vector<ViewPixel> load_view_pixels(const std::filesystem::path& path, std::
   std::set<std::string> names;
   for (std::size_t row = 0; row < table.rows(); ++row) {
     pixels.push_back({table.text(row, "view"), pixel_of(table, row), covariance_of(table, row)});
-    expect_once(table, row, "view", names);
+    if (!pixels.back().view.empty() && !names.insert(pixels.back().view).second)
+      table.add_mistake(row, "view", in_quotes(pixels.back().view) + " again", "each view once");
     if (std::ranges::find(poses, pixels.back().view, &HandPose::name) == poses.end())
       table.add_mistake(row, "view", in_quotes(pixels.back().view), "a view that the robot's table has");
   }

@@ -18,8 +18,7 @@ struct HandPose {
   Pose X_RH = Pose::Identity();
 };
 
-// Columns x_mm y_mm z_mm rx_deg ry_deg rz_deg and a name in `column` ("view", "touch"), each once; where the
-// column is not required and absent, names are 1, 2, ... All throw ConfigError with every mistake.
+// X_RH by name, as load_named_poses(). All throw ConfigError with every mistake.
 std::vector<HandPose> load_hand_poses(const std::filesystem::path& path, std::string_view column,
                                       bool required);
 

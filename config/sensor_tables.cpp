@@ -43,24 +43,6 @@ std::vector<KnownPoint> load_known_points(const std::filesystem::path& path, dou
   return points;
 }
 
-NamedPoses load_named_poses(const std::filesystem::path& path) {
-  CsvTable table = load_csv(path, {{"view", "x_mm", "y_mm", "z_mm", "rx_deg", "ry_deg", "rz_deg"}, {}});
-  NamedPoses poses;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    const std::string name = table.text(row, "view");
-    if (!name.empty() && std::ranges::find(poses, name, &std::pair<std::string, Pose>::first) != poses.end())
-      table.add_mistake(row, "view", in_quotes(name) + " again", "each view once");
-    const auto length = [&](const char* column) {
-      return table.number(row, column, -largest_mm, largest_mm);
-    };
-    const auto angle = [&](const char* column) { return table.number(row, column, -360, 360); };
-    poses.emplace_back(name, from_six_numbers({length("x_mm"), length("y_mm"), length("z_mm"),
-                                               angle("rx_deg"), angle("ry_deg"), angle("rz_deg")}));
-  }
-  table.throw_if_wrong();
-  return poses;
-}
-
 std::vector<SensorSighting> load_sightings(const std::filesystem::path& path,
                                            std::span<const CalibratedCamera> cameras,
                                            std::span<const KnownPoint> points,

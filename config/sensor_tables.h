@@ -5,20 +5,16 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "config/config_error.h"
+#include "config/pose_table.h"
 #include "measure/sensor.h"
 
 namespace zeropose {
 
 // Columns point x_mm y_mm z_mm [sigma_mm], each point once. All throw ConfigError with every mistake.
 std::vector<KnownPoint> load_known_points(const std::filesystem::path& path, double sigma_mm);
-
-// Columns view x_mm y_mm z_mm rx_deg ry_deg rz_deg, each view once: a pose by its name.
-using NamedPoses = std::vector<std::pair<std::string, Pose>>;
-NamedPoses load_named_poses(const std::filesystem::path& path);
 
 // Columns camera point u_px v_px [suu svv suv] and, with the poses X_RH of a hand, view. Sightings in the
 // order in which they first appear.

@@ -57,14 +57,6 @@ struct BallPlaces {
   std::vector<std::string> without_pixel;
 };
 
-Eigen::Vector3d centre_of(const std::string& text, const std::string& option) {
-  const std::vector<double> numbers = parse_numbers(text, option);
-  if (numbers.size() != 3)
-    throw std::invalid_argument(
-        concat({option, ": found ", std::to_string(numbers.size()), " numbers, expected X,Y,Z in mm"}));
-  return {numbers[0], numbers[1], numbers[2]};
-}
-
 void refuse_wrong_centre(const BallOptions& options, bool in_hand) {
   if (in_hand && (!options.ball || options.tool))
     throw std::invalid_argument("eye-in-hand: expected --ball (its centre in the base) and no --tool");
@@ -82,7 +74,8 @@ BallPlaces places_of(const BallOptions& options) {
   BallPlaces places;
   places.in_hand = options.setup == "eye-in-hand";
   refuse_wrong_centre(options, places.in_hand);
-  places.centre_mm = places.in_hand ? centre_of(*options.ball, "--ball") : centre_of(*options.tool, "--tool");
+  places.centre_mm =
+      places.in_hand ? place_of_option(*options.ball, "--ball") : place_of_option(*options.tool, "--tool");
   places.X_WR = pose_of_option(options.X_WR, "--X-WR");
   const std::vector<HandPose> poses = load_hand_poses(options.robot, "view", true);
   places.pixels = load_view_pixels(options.pixels, poses);

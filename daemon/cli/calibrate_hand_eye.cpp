@@ -99,10 +99,7 @@ Json hand_eye_json(const HandEyeOptions& options, const std::vector<HandEyeView>
   json["views"] = views_json(views, result);
   json["removed"] = names_json(views, result.removed);
   json["suspects"] = names_json(views, result.suspects);
-  if (result.status == HandEyeStatus::rotation_missing) {
-    json["open_axis_R"] = json_of(result.turns.axis_R);
-    json["open_axis_H"] = json_of(result.turns.axis_H);
-  }
+  if (result.status == HandEyeStatus::rotation_missing) add_open_axes(result.turns, json);
   json["warnings"] = result.warnings;
   return json;
 }

@@ -8,6 +8,7 @@
 #include "config/csv.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/convert.h"
 #include "daemon/cli/output.h"
 
 namespace zeropose {
@@ -40,14 +41,6 @@ struct PoseOnlyOptions {
   bool replace = false, json = false;
 };
 
-Eigen::Vector3d three_numbers(const std::string& text, const std::string& option) {
-  const std::vector<double> numbers = parse_numbers(text, option);
-  if (numbers.size() != 3)
-    throw std::invalid_argument(option + ": found " + std::to_string(numbers.size()) +
-                                " numbers, expected X,Y,Z in mm");
-  return {numbers[0], numbers[1], numbers[2]};
-}
-
 std::vector<HousingFeature> features_of(const PoseOnlyOptions& options) {
   if (options.features.size() != options.features_world.size())
     throw std::invalid_argument("--feature is given " + std::to_string(options.features.size()) +
@@ -55,8 +48,8 @@ std::vector<HousingFeature> features_of(const PoseOnlyOptions& options) {
                                 " times, expected as often");
   std::vector<HousingFeature> features;
   for (std::size_t i = 0; i < options.features.size(); ++i)
-    features.push_back({three_numbers(options.features[i], "--feature"),
-                        three_numbers(options.features_world[i], "--feature-world"),
+    features.push_back({place_of_option(options.features[i], "--feature"),
+                        place_of_option(options.features_world[i], "--feature-world"),
                         options.feature_sigma_mm});
   if (options.points.empty() && features.size() < 3)
     throw std::invalid_argument("--points is required with fewer than three features");

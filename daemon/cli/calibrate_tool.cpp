@@ -62,10 +62,7 @@ Json tool_json(const std::vector<HandPose>& touches, const ToolResult& result) {
   json["residuals_mm"] = residuals_json(touches, result);
   json["removed"] = names_json(touches, result.removed);
   json["suspects"] = names_json(touches, result.suspects);
-  if (result.status == ToolStatus::rotation_missing) {
-    json["open_axis_R"] = json_of(result.turns.axis_R);
-    json["open_axis_H"] = json_of(result.turns.axis_H);
-  }
+  if (result.status == ToolStatus::rotation_missing) add_open_axes(result.turns, json);
   json["warnings"] = result.warnings;
   return json;
 }

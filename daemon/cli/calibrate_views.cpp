@@ -13,7 +13,7 @@
 #include "config/cameras.h"
 #include "config/csv.h"
 #include "config/files.h"
-#include "config/sensor_tables.h"
+#include "config/pose_table.h"
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibration_answer.h"

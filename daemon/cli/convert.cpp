@@ -238,6 +238,14 @@ std::optional<Pose> cli::pose_of_option(const std::optional<std::string>& text, 
   return convert(Convention::generic, Convention::generic, *text, option).X_AB;
 }
 
+Eigen::Vector3d cli::place_of_option(const std::string& text, const std::string& option) {
+  const std::vector<double> numbers = parse_numbers(text, option);
+  if (numbers.size() != 3)
+    throw std::invalid_argument(
+        concat({option, ": found ", std::to_string(numbers.size()), " numbers, expected X,Y,Z in mm"}));
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
 Eigen::Vector2d cli::point_of_option(const std::string& text, const std::string& option) {
   const std::vector<double> numbers = parse_numbers(text, option);
   if (numbers.size() != 2)

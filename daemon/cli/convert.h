@@ -17,6 +17,9 @@ namespace cli {
 // std::invalid_argument that name the option.
 std::optional<Pose> pose_of_option(const std::optional<std::string>& text, const std::string& option);
 
+// The three numbers of an option's "X,Y,Z", mm. Throws likewise.
+Eigen::Vector3d place_of_option(const std::string& text, const std::string& option);
+
 // The two numbers of an option's "CX,CY". Throws likewise.
 Eigen::Vector2d point_of_option(const std::string& text, const std::string& option);
 

@@ -1,6 +1,7 @@
 // What the calibrations with a robot answer alike: covariances, sigmas, warnings.
 #pragma once
 
+#include "calib/robot_poses.h"
 #include "daemon/cli/answer.h"
 
 namespace zeropose::cli {
@@ -18,6 +19,12 @@ inline Vector6 sigma_of(const Matrix6& covariance) {
   Vector6 sigma = covariance.diagonal().cwiseSqrt();
   sigma.tail<3>() *= degrees_per_radian;
   return sigma;
+}
+
+// About which the answer is open.
+inline void add_open_axes(const HandTurns& turns, Json& json) {
+  json["open_axis_R"] = json_of(turns.axis_R);
+  json["open_axis_H"] = json_of(turns.axis_H);
 }
 
 inline std::string warnings_text(const std::vector<std::string>& warnings) {
