@@ -70,19 +70,19 @@ Answer check_config(const std::string& file) {
   return answer;
 }
 
-void add_check_config(CLI::App& app, int& exit_status) {
+void add_check_config(cli::Verb app, int& exit_status) {
   struct Options {
     std::string file;
     bool json = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* verb =
+  const Verb verb =
       app.add_subcommand("check-config", "Checks a cell file and the calibration file that it names");
-  verb->add_option("CELL", options->file, "the cell file (JSON, comments allowed)")->required();
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, mistakes, counts, hashes");
-  verb->footer(check_config_help);
-  verb->callback([options, &exit_status] {
+  verb.add_option("CELL", options->file, "the cell file (JSON, comments allowed)").required();
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, mistakes, counts, hashes");
+  verb.footer(check_config_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return check_config(options->file); }, options->json);
   });
 }
@@ -136,21 +136,21 @@ Answer best_fit_of(const std::string& file) {
   return answer;
 }
 
-void add_bestfit(CLI::App& app, int& exit_status) {
+void add_bestfit(cli::Verb app, int& exit_status) {
   struct Options {
     std::string points;
     bool json = false;
   };
   auto options = std::make_shared<Options>();
-  CLI::App* verb =
+  const Verb verb =
       app.add_subcommand("bestfit", "The rigid pose between two frames from points known in both");
-  verb->add_option("--points", options->points, "CSV with the columns xa ya za xb yb zb [weight], mm")
-      ->required();
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, X_AB [x, y, z, rx, ry, rz], residuals, rms_mm,\n"
-                 "sigma_mm, covariance (6x6, mm and rad)");
-  verb->footer(bestfit_help);
-  verb->callback([options, &exit_status] {
+  verb.add_option("--points", options->points, "CSV with the columns xa ya za xb yb zb [weight], mm")
+      .required();
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, X_AB [x, y, z, rx, ry, rz], residuals, rms_mm,\n"
+                "sigma_mm, covariance (6x6, mm and rad)");
+  verb.footer(bestfit_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return best_fit_of(options->points); }, options->json);
   });
 }
@@ -244,40 +244,40 @@ Answer estimate(const PoseOptions& options) {
   return {result.code == Code::ok ? done : no_answer, pose_json(input, result), pose_text(input, result)};
 }
 
-void add_pose_options(CLI::App& verb, PoseOptions& options) {
+void add_pose_options(cli::Verb verb, PoseOptions& options) {
   verb.add_option("--cameras", options.cameras, "JSON {\"name\": camera, ...} with model, internals and X_WC")
-      ->required();
+      .required();
   verb.add_option("--marks", options.marks,
                   "CSV: mark x_mm y_mm z_mm [weight tolerance_px tolerance_mm sigma_mm]")
-      ->required();
+      .required();
   verb.add_option("--observations", options.observations, "CSV: camera mark u_px v_px [suu svv suv]")
-      ->required();
+      .required();
   verb.add_option("--start", options.start, "x,y,z,rx,ry,rz to start from; without it from any pose");
   verb.add_option("--planar", options.planar,
                   "x,y,z,rx,ry,rz of a plane in the world: only x, y, rz in it are free, 2 marks suffice");
   verb.add_option("--system-sigma-px", options.system_sigma_px, "calibration errors that remain, in px (0)")
-      ->check(CLI::Range(0.0, 100.0));
+      .range(0.0, 100.0);
   verb.add_option("--residual", options.residual, "what is minimised (reprojection)")
-      ->check(CLI::IsMember({"reprojection", "algebraic"}));
+      .one_of({"reprojection", "algebraic"});
   verb.add_flag(
       "--json", options.json,
       "one JSON object on stdout: status, reason, code, X_WO [x, y, z, rx, ry, rz], covariance (6x6, mm and\n"
       "rad), deviations, removed, effective_marks, effective_cameras, redundancy");
 }
 
-void add_pose(CLI::App& app, int& exit_status) {
+void add_pose(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<PoseOptions>();
-  CLI::App* verb =
+  const Verb verb =
       app.add_subcommand("pose", "The pose of an object from marks found in any number of cameras");
-  add_pose_options(*verb, *options);
-  verb->footer(pose_help);
-  verb->callback(
+  add_pose_options(verb, *options);
+  verb.footer(pose_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return estimate(*options); }, options->json); });
 }
 
 }  // namespace
 
-void add_batch_verbs(CLI::App& app, int& exit_status) {
+void add_batch_verbs(cli::Verb app, int& exit_status) {
   add_check_config(app, exit_status);
   add_pose(app, exit_status);
   add_bestfit(app, exit_status);

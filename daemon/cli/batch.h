@@ -2,12 +2,12 @@
 // convert, find, find-board, plan (spec 92).
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
 // Adds the verbs; the one that is called sets exit_status: 0 done, 1 the input cannot give an answer, 2 wrong
 // usage or unreadable input. With --json exactly one object goes to stdout; messages always go to stderr.
-void add_batch_verbs(CLI::App& app, int& exit_status);
+void add_batch_verbs(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

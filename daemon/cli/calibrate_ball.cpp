@@ -179,18 +179,18 @@ Answer calibrate_ball(const BallOptions& options) {
   return answer;
 }
 
-void add_options(CLI::App& verb, BallOptions& options) {
+void add_options(cli::Verb verb, BallOptions& options) {
   verb.add_option("--setup", options.setup, "where the camera is: eye-in-hand or eye-to-hand")
-      ->required()
-      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+      .required()
+      .one_of({"eye-in-hand", "eye-to-hand"});
   verb.add_option("--robot", options.robot,
                   "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, the hand's pose X_RH")
-      ->required();
-  verb.add_option("--pixels", options.pixels, "CSV: view u_px v_px [suu svv suv]")->required();
+      .required();
+  verb.add_option("--pixels", options.pixels, "CSV: view u_px v_px [suu svv suv]").required();
   verb.add_option("--tool", options.tool, "X,Y,Z of the ball's centre in the hand (eye-to-hand)");
   verb.add_option("--ball", options.ball, "X,Y,Z of the ball's centre in the robot's base (eye-in-hand)");
   verb.add_option("--radius-mm", options.radius_mm, "of the ball: its outline's centre is then corrected")
-      ->check(CLI::Range(0.0, 1e4));
+      .range(0.0, 1e4);
   verb.add_option("--X-WR", options.X_WR, "x,y,z,rx,ry,rz of the robot's base in the world");
   add_problem_options(verb, options.points);
   add_answer_options(verb, options.points);
@@ -198,13 +198,13 @@ void add_options(CLI::App& verb, BallOptions& options) {
 
 }  // namespace
 
-void add_calibrate_ball(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_ball(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<BallOptions>();
-  CLI::App* verb = calibrate.add_subcommand(
+  const Verb verb = calibrate.add_subcommand(
       "ball", "One camera from a ball that a robot moves, or that its hand goes round");
-  add_options(*verb, *options);
-  verb->footer(calibrate_ball_help);
-  verb->callback([options, &exit_status] {
+  add_options(verb, *options);
+  verb.footer(calibrate_ball_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_ball(*options); }, options->points.json);
   });
 }

@@ -198,25 +198,25 @@ Answer calibrate_body(Options options) {
 
 }  // namespace
 
-void add_calibrate_body(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_body(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<Options>();
   // Maximum likelihood: the marks' places are as good as their covariances say.
   options->points.refine = "joint";
-  CLI::App* verb = calibrate.add_subcommand(
+  const Verb verb = calibrate.add_subcommand(
       "body", "One camera from a calibration body, in the world by its control marks");
-  CLI::Option* image = verb->add_option("--image", options->body.image, "picture of the body");
-  verb->add_option("--body", options->body.body, "CSV: mark x_mm y_mm z_mm [radius_mm nx ny nz]");
-  verb->add_option("--points", options->points.points, "CSV of find-body instead of a picture")
-      ->excludes(image);
-  verb->add_option("--control", options->control, "CSV: [mark] xa ya za xb yb zb, control marks in W and B");
-  verb->add_option("--control-sigma-mm", options->control_sigma_mm,
-                   "of one coordinate of a control mark (0.05)")
-      ->check(CLI::Range(1e-6, 100.0));
-  add_body_options(*verb, options->body);
-  add_problem_options(*verb, options->points);
-  add_answer_options(*verb, options->points);
-  verb->footer(calibrate_body_help);
-  verb->callback([options, &exit_status] {
+  const VerbOption image = verb.add_option("--image", options->body.image, "picture of the body");
+  verb.add_option("--body", options->body.body, "CSV: mark x_mm y_mm z_mm [radius_mm nx ny nz]");
+  verb.add_option("--points", options->points.points, "CSV of find-body instead of a picture")
+      .excludes(image);
+  verb.add_option("--control", options->control, "CSV: [mark] xa ya za xb yb zb, control marks in W and B");
+  verb.add_option("--control-sigma-mm", options->control_sigma_mm,
+                  "of one coordinate of a control mark (0.05)")
+      .range(1e-6, 100.0);
+  add_body_options(verb, options->body);
+  add_problem_options(verb, options->points);
+  add_answer_options(verb, options->points);
+  verb.footer(calibrate_body_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_body(*options); }, options->points.json);
   });
 }

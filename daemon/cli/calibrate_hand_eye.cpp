@@ -173,28 +173,28 @@ Answer calibrate_hand_eye_of(const HandEyeOptions& options) {
           hand_eye_text(options, views, result)};
 }
 
-void add_options(CLI::App& verb, HandEyeOptions& options) {
+void add_options(cli::Verb verb, HandEyeOptions& options) {
   verb.add_option("--setup", options.setup, "where the camera is: eye-in-hand or eye-to-hand")
-      ->required()
-      ->check(CLI::IsMember({"eye-in-hand", "eye-to-hand"}));
+      .required()
+      .one_of({"eye-in-hand", "eye-to-hand"});
   verb.add_option("--robot", options.robot,
                   "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, the hand's pose X_RH")
-      ->required();
+      .required();
   verb.add_option("--points", options.points,
                   "CSV: view x_mm y_mm [z_mm] u_px v_px [suu svv suv] [radius_mm nx ny nz]")
-      ->required();
-  verb.add_option("--camera", options.camera, "JSON of the camera: its internals")->required();
+      .required();
+  verb.add_option("--camera", options.camera, "JSON of the camera: its internals").required();
   verb.add_option("--name", options.name, "of the camera, where the file holds several");
   verb.add_option("--sigma-px", options.sigma_px,
                   "noise of one pixel coordinate; without it from the residuals in the views")
-      ->check(CLI::Range(1e-6, 100.0));
-  auto* mm = verb.add_option("--robot-sigma-mm", options.robot_sigma_mm,
-                             "of one coordinate of the hand; without it from the views")
-                 ->check(CLI::Range(1e-6, 100.0));
-  auto* deg =
+      .range(1e-6, 100.0);
+  const VerbOption mm = verb.add_option("--robot-sigma-mm", options.robot_sigma_mm,
+                                        "of one coordinate of the hand; without it from the views")
+                            .range(1e-6, 100.0);
+  const VerbOption deg =
       verb.add_option("--robot-sigma-deg", options.robot_sigma_deg, "of the hand's turn about one axis")
-          ->check(CLI::Range(1e-6, 10.0));
-  mm->needs(deg), deg->needs(mm);
+          .range(1e-6, 10.0);
+  mm.needs(deg), deg.needs(mm);
   verb.add_option("--X-WR", options.X_WR,
                   "x,y,z,rx,ry,rz of the robot's base in the world, for --output with eye-to-hand");
   verb.add_option("--output", options.output, "camera JSON to write: with X_HC, or with X_WC = X_WR X_RC");
@@ -209,13 +209,13 @@ void add_options(CLI::App& verb, HandEyeOptions& options) {
 
 }  // namespace
 
-void add_calibrate_hand_eye(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_hand_eye(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<HandEyeOptions>();
-  CLI::App* verb = calibrate.add_subcommand(
+  const Verb verb = calibrate.add_subcommand(
       "hand-eye", "A camera on a robot's hand or before it, from views of a board at several poses");
-  add_options(*verb, *options);
-  verb->footer(calibrate_hand_eye_help);
-  verb->callback([options, &exit_status] {
+  add_options(verb, *options);
+  verb.footer(calibrate_hand_eye_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_hand_eye_of(*options); }, options->json);
   });
 }

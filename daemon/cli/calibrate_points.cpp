@@ -24,14 +24,14 @@ Answer calibrate_points(const PointsOptions& options) {
 
 }  // namespace
 
-void add_calibrate_points(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_points(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<PointsOptions>();
-  CLI::App* verb = calibrate.add_subcommand("points", "One camera from known points and their pixels");
-  verb->add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px")->required();
-  add_problem_options(*verb, *options);
-  add_answer_options(*verb, *options);
-  verb->footer(calibrate_points_help);
-  verb->callback([options, &exit_status] {
+  const Verb verb = calibrate.add_subcommand("points", "One camera from known points and their pixels");
+  verb.add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px").required();
+  add_problem_options(verb, *options);
+  add_answer_options(verb, *options);
+  verb.footer(calibrate_points_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_points(*options); }, options->json);
   });
 }

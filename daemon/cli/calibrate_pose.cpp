@@ -133,35 +133,34 @@ Answer calibrate_pose_of(const PoseOnlyOptions& options) {
 
 }  // namespace
 
-void add_calibrate_pose(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_pose(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<PoseOnlyOptions>();
-  CLI::App* verb =
+  const Verb verb =
       calibrate.add_subcommand("pose", "X_WC of a camera whose internals are known, from measured points");
-  verb->add_option("--camera", options->camera, "JSON of the camera: its internals")->required();
-  verb->add_option("--name", options->name, "of the camera, where the file holds several");
-  verb->add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
-  verb->add_flag("--replace", options->replace, "overwrite --output");
-  verb->add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px [suu svv suv]");
-  verb->add_option("--feature", options->features,
-                   "FX,FY,FZ of a point on the housing, in the camera's frame")
-      ->allow_extra_args(false);
-  verb->add_option("--feature-world", options->features_world,
-                   "X,Y,Z of the same point, measured in the world")
-      ->allow_extra_args(false);
-  verb->add_option("--feature-sigma-mm", options->feature_sigma_mm, "of one coordinate of a feature (0.02)")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_option("--sigma-px", options->sigma_px,
-                   "noise of one pixel coordinate; without it from the residuals")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_option("--residual", options->residual,
-                   "what is minimised: reprojection (px; without features) or algebraic (mm; with them)")
-      ->check(CLI::IsMember({"reprojection", "algebraic"}));
-  verb->add_flag(
+  verb.add_option("--camera", options->camera, "JSON of the camera: its internals").required();
+  verb.add_option("--name", options->name, "of the camera, where the file holds several");
+  verb.add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
+  verb.add_flag("--replace", options->replace, "overwrite --output");
+  verb.add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px [suu svv suv]");
+  verb.add_option("--feature", options->features, "FX,FY,FZ of a point on the housing, in the camera's frame")
+      .once_per_value();
+  verb.add_option("--feature-world", options->features_world,
+                  "X,Y,Z of the same point, measured in the world")
+      .once_per_value();
+  verb.add_option("--feature-sigma-mm", options->feature_sigma_mm, "of one coordinate of a feature (0.02)")
+      .range(1e-6, 100.0);
+  verb.add_option("--sigma-px", options->sigma_px,
+                  "noise of one pixel coordinate; without it from the residuals")
+      .range(1e-6, 100.0);
+  verb.add_option("--residual", options->residual,
+                  "what is minimised: reprojection (px; without features) or algebraic (mm; with them)")
+      .one_of({"reprojection", "algebraic"});
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, X_WC, sigma, covariance (6x6, mm and rad), deviations,\n"
       "feature_deviations_mm, alternatives");
-  verb->footer(calibrate_pose_help);
-  verb->callback([options, &exit_status] {
+  verb.footer(calibrate_pose_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_pose_of(*options); }, options->json);
   });
 }

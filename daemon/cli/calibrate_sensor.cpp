@@ -111,24 +111,24 @@ Answer calibrate(const Options& options) {
 
 }  // namespace
 
-void add_calibrate_sensor(CLI::App& calibrate_verb, int& exit_status) {
+void add_calibrate_sensor(cli::Verb calibrate_verb, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = calibrate_verb.add_subcommand("sensor", "Where a stereo sensor stands, or sits on a hand");
-  verb->add_option("--cameras", options->cameras, "JSON {\"name\": camera, ...} with poses X_SC as X_WC")
-      ->required();
-  verb->add_option("--points", options->points, "CSV: point x_mm y_mm z_mm [sigma_mm]")->required();
-  verb->add_option("--observations", options->observations,
-                   "CSV: camera point u_px v_px [suu svv suv], with --robot also view")
-      ->required();
-  verb->add_option("--robot", options->robot, "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, X_RH");
-  verb->add_option("--sigma-mm", options->sigma_mm, "of one coordinate of a known point (0.02)")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_flag(
-      "--json", options->json,
-      "one JSON object on stdout: status, reason, X_WS or X_HS, sigma, covariance, rms_mm, points\n"
-      "[{point, view, p_S, residual_mm, ray_gap_mm, removed, suspect}]");
-  verb->footer(calibrate_sensor_help);
-  verb->callback(
+  const Verb verb =
+      calibrate_verb.add_subcommand("sensor", "Where a stereo sensor stands, or sits on a hand");
+  verb.add_option("--cameras", options->cameras, "JSON {\"name\": camera, ...} with poses X_SC as X_WC")
+      .required();
+  verb.add_option("--points", options->points, "CSV: point x_mm y_mm z_mm [sigma_mm]").required();
+  verb.add_option("--observations", options->observations,
+                  "CSV: camera point u_px v_px [suu svv suv], with --robot also view")
+      .required();
+  verb.add_option("--robot", options->robot, "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, X_RH");
+  verb.add_option("--sigma-mm", options->sigma_mm, "of one coordinate of a known point (0.02)")
+      .range(1e-6, 100.0);
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, X_WS or X_HS, sigma, covariance, rms_mm, points\n"
+                "[{point, view, p_S, residual_mm, ray_gap_mm, removed, suspect}]");
+  verb.footer(calibrate_sensor_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return calibrate(*options); }, options->json); });
 }
 

@@ -146,34 +146,32 @@ Answer survey(const Options& options) {
 
 }  // namespace
 
-void add_calibrate_survey(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb =
+  const Verb verb =
       calibrate.add_subcommand("survey", "Gathers what a camera sees at positions that a robot tells");
-  verb->add_option("--socket", options->socket, "the daemon's Unix socket")->capture_default_str();
-  verb->add_option("--camera", options->camera, "name of the camera in the cell")->required();
-  verb->add_option("--positions", options->positions, "how many positions the robot goes through")
-      ->required()
-      ->check(CLI::Range(1, 1000));
-  verb->add_option("--target", options->target, "what is looked for")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"ball", "circles", "asymmetric-circles", "chessboard"}));
-  verb->add_flag("--bright", options->bright, "the ball is brighter than what surrounds it");
-  verb->add_option("--min-diameter-px", options->min_diameter_px, "of the ball's image");
-  verb->add_option("--max-diameter-px", options->max_diameter_px, "of the ball's image");
-  verb->add_option("--rows", options->rows, "of a board");
-  verb->add_option("--cols", options->cols, "of a board");
-  verb->add_option("--pitch-mm", options->pitch_mm, "of a board");
-  verb->add_option("--robot", options->robot, "the CSV of the hand's poses to write")->required();
-  verb->add_option("--points", options->points, "the CSV of the pixels to write")->required();
-  verb->add_flag("--replace", options->replace, "overwrite these two");
-  verb->add_option("--patience", options->patience_s, "seconds to wait for all positions")
-      ->capture_default_str();
-  verb->add_flag(
-      "--json", options->json,
-      "one JSON object on stdout: status, reason, positions, missing, last_problem, robot, points");
-  verb->footer(help);
-  verb->callback(
+  verb.add_option("--socket", options->socket, "the daemon's Unix socket").shows_default();
+  verb.add_option("--camera", options->camera, "name of the camera in the cell").required();
+  verb.add_option("--positions", options->positions, "how many positions the robot goes through")
+      .required()
+      .range(1, 1000);
+  verb.add_option("--target", options->target, "what is looked for")
+      .shows_default()
+      .one_of({"ball", "circles", "asymmetric-circles", "chessboard"});
+  verb.add_flag("--bright", options->bright, "the ball is brighter than what surrounds it");
+  verb.add_option("--min-diameter-px", options->min_diameter_px, "of the ball's image");
+  verb.add_option("--max-diameter-px", options->max_diameter_px, "of the ball's image");
+  verb.add_option("--rows", options->rows, "of a board");
+  verb.add_option("--cols", options->cols, "of a board");
+  verb.add_option("--pitch-mm", options->pitch_mm, "of a board");
+  verb.add_option("--robot", options->robot, "the CSV of the hand's poses to write").required();
+  verb.add_option("--points", options->points, "the CSV of the pixels to write").required();
+  verb.add_flag("--replace", options->replace, "overwrite these two");
+  verb.add_option("--patience", options->patience_s, "seconds to wait for all positions").shows_default();
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, positions, missing, last_problem, robot, points");
+  verb.footer(help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return survey(*options); }, options->json); });
 }
 

@@ -99,22 +99,22 @@ Answer calibrate_tool_of(const ToolOptions& options) {
 
 }  // namespace
 
-void add_calibrate_tool(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_tool(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<ToolOptions>();
-  CLI::App* verb =
+  const Verb verb =
       calibrate.add_subcommand("tool", "The end of a robot's tool from touches of a fixed point");
-  verb->add_option("--touches", options->touches,
-                   "CSV: [touch] x_mm y_mm z_mm rx_deg ry_deg rz_deg, the hand's pose X_RH per touch")
-      ->required();
-  verb->add_option("--sigma-mm", options->sigma_mm,
-                   "of one coordinate of a touch; without it from the residuals")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_flag(
+  verb.add_option("--touches", options->touches,
+                  "CSV: [touch] x_mm y_mm z_mm rx_deg ry_deg rz_deg, the hand's pose X_RH per touch")
+      .required();
+  verb.add_option("--sigma-mm", options->sigma_mm,
+                  "of one coordinate of a touch; without it from the residuals")
+      .range(1e-6, 100.0);
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, p_HT, fixed_point, residuals_mm, sigma, covariance (3x3,\n"
       "mm^2), rms_mm, removed, suspects, warnings");
-  verb->footer(calibrate_tool_help);
-  verb->callback([options, &exit_status] {
+  verb.footer(calibrate_tool_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_tool_of(*options); }, options->json);
   });
 }

@@ -152,28 +152,28 @@ Answer calibrate_vanishing(const VanishingOptions& options) {
 
 }  // namespace
 
-void add_calibrate_vanishing(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_vanishing(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<VanishingOptions>();
-  CLI::App* verb =
+  const Verb verb =
       calibrate.add_subcommand("vanishing", "Internals from the vanishing points of a rectangle");
-  verb->add_option("--pairs", options->pairs, "CSV: v1_u_px v1_v_px v2_u_px v2_v_px");
-  verb->add_option("--corners", options->corners, "CSV: image corner u_px v_px, corner 1..4 = A B C D");
-  verb->add_option("--ratio", options->ratio, "k = AD / AB")->check(CLI::Range(1e-3, 1e3));
-  verb->add_option("--side-mm", options->side_mm, "L = AB")->check(CLI::Range(1e-3, 1e6));
-  verb->add_flag("--square", options->square, "the rectangle is a square: its diagonals help");
-  verb->add_option("--first", options->first, "only the first N images")->check(CLI::Range(1, 1000000));
-  verb->add_option("--max-px", options->max_px, "skip vanishing points farther away than this (off)")
-      ->check(CLI::Range(1.0, 1e12));
-  verb->add_option("--origin", options->origin, "CX,CY is known");
-  verb->add_option("--focal", options->focal, "FX,FY is known");
-  verb->add_option("--near", options->near, "CX,CY about: where two origins fit (the image centre)");
-  verb->add_option("--width", options->width_px, "of the image, px")->check(CLI::Range(1, 65535));
-  verb->add_option("--height", options->height_px, "of the image, px")->check(CLI::Range(1, 65535));
-  verb->add_flag("--one-focal", options->one_focal, "fx = fy");
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, fx fy cx cy, used, skipped, condition, poses");
-  verb->footer(calibrate_vanishing_help);
-  verb->callback([options, &exit_status] {
+  verb.add_option("--pairs", options->pairs, "CSV: v1_u_px v1_v_px v2_u_px v2_v_px");
+  verb.add_option("--corners", options->corners, "CSV: image corner u_px v_px, corner 1..4 = A B C D");
+  verb.add_option("--ratio", options->ratio, "k = AD / AB").range(1e-3, 1e3);
+  verb.add_option("--side-mm", options->side_mm, "L = AB").range(1e-3, 1e6);
+  verb.add_flag("--square", options->square, "the rectangle is a square: its diagonals help");
+  verb.add_option("--first", options->first, "only the first N images").range(1, 1000000);
+  verb.add_option("--max-px", options->max_px, "skip vanishing points farther away than this (off)")
+      .range(1.0, 1e12);
+  verb.add_option("--origin", options->origin, "CX,CY is known");
+  verb.add_option("--focal", options->focal, "FX,FY is known");
+  verb.add_option("--near", options->near, "CX,CY about: where two origins fit (the image centre)");
+  verb.add_option("--width", options->width_px, "of the image, px").range(1, 65535);
+  verb.add_option("--height", options->height_px, "of the image, px").range(1, 65535);
+  verb.add_flag("--one-focal", options->one_focal, "fx = fy");
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, fx fy cx cy, used, skipped, condition, poses");
+  verb.footer(calibrate_vanishing_help);
+  verb.callback([options, &exit_status] {
     exit_status = run(
         [&] {
           if (options->square && options->ratio && *options->ratio != 1)

@@ -267,14 +267,14 @@ Answer calibrate_views_of(const ViewsOptions& options) {
           text_of_result(input, result, pose)};
 }
 
-void add_options(CLI::App& verb, ViewsOptions& options) {
+void add_options(cli::Verb verb, ViewsOptions& options) {
   verb.add_option("--points", options.points,
                   "CSV: view [camera] x_mm y_mm [z_mm] u_px v_px [suu svv suv] [radius_mm nx ny nz]")
-      ->required();
-  verb.add_option("--width", options.width_px, "of the image, px")->check(CLI::Range(1, 65535));
-  verb.add_option("--height", options.height_px, "of the image, px")->check(CLI::Range(1, 65535));
+      .required();
+  verb.add_option("--width", options.width_px, "of the image, px").range(1, 65535);
+  verb.add_option("--height", options.height_px, "of the image, px").range(1, 65535);
   verb.add_option("--model", options.model, "the lens: division or brown (division)")
-      ->check(CLI::IsMember({"division", "brown"}));
+      .one_of({"division", "brown"});
   verb.add_option("--start", options.start, "a file of cameras to begin with");
   verb.add_option(
       "--poses", options.poses,
@@ -282,12 +282,12 @@ void add_options(CLI::App& verb, ViewsOptions& options) {
   verb.add_option("--fix", options.fix, "parameters to hold, parted by commas, e.g. p1,p2,k3");
   verb.add_flag("--one-focal", options.one_focal, "fx = fy");
   verb.add_option("--sigma-px", options.sigma_px, "of one pixel coordinate; without it from the residuals")
-      ->check(CLI::Range(0.0, 100.0));
+      .range(0.0, 100.0);
   verb.add_option("--reject-px", options.reject_px, "throw out points that deviate by more, worst first")
-      ->check(CLI::Range(0.0, 1e6));
+      .range(0.0, 1e6);
   verb.add_option("--robust", options.robust,
                   "Cauchy's loss: deviations of many times this, px, count little")
-      ->check(CLI::Range(0.0, 1e6));
+      .range(0.0, 1e6);
   verb.add_option("--report", options.report,
                   "the report as a page (SVG) to write; of a rig one per camera, PAGE-camera.svg");
   verb.add_flag("--json", options.json,
@@ -297,13 +297,13 @@ void add_options(CLI::App& verb, ViewsOptions& options) {
 
 }  // namespace
 
-void add_calibrate_views(CLI::App& calibrate, int& exit_status) {
+void add_calibrate_views(cli::Verb calibrate, int& exit_status) {
   auto options = std::make_shared<ViewsOptions>();
-  CLI::App* verb = calibrate.add_subcommand(
+  const Verb verb = calibrate.add_subcommand(
       "views", "Internals of a camera, or a rig of cameras, from several views of a board");
-  add_options(*verb, *options);
-  verb->footer(help);
-  verb->callback([options, &exit_status] {
+  add_options(verb, *options);
+  verb.footer(help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return calibrate_views_of(*options); }, options->json);
   });
 }

@@ -1,11 +1,11 @@
 // zeropose calibrate views (spec 92).
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
 // Adds the verb to its parent `calibrate`; exit_status as in batch.h.
-void add_calibrate_views(CLI::App& calibrate, int& exit_status);
+void add_calibrate_views(cli::Verb calibrate, int& exit_status);
 
 }  // namespace zeropose

@@ -157,13 +157,13 @@ Answer undo(const Options& options) {
   return answer;
 }
 
-CLI::App* subcommand(CLI::App& parent, const std::string& name, const std::string& text,
+cli::Verb subcommand(cli::Verb parent, const std::string& name, const std::string& text,
                      const std::shared_ptr<Options>& options, int& exit_status,
                      Answer (*answer)(const Options&)) {
-  CLI::App* verb = parent.add_subcommand(name, text);
-  verb->add_option("--cell", options->cell, "the cell file")->required();
-  verb->add_flag("--json", options->json, "one JSON object on stdout");
-  verb->callback([options, answer, &exit_status] {
+  const Verb verb = parent.add_subcommand(name, text);
+  verb.add_option("--cell", options->cell, "the cell file").required();
+  verb.add_flag("--json", options->json, "one JSON object on stdout");
+  verb.callback([options, answer, &exit_status] {
     exit_status = run([&] { return answer(*options); }, options->json);
   });
   return verb;
@@ -171,23 +171,23 @@ CLI::App* subcommand(CLI::App& parent, const std::string& name, const std::strin
 
 }  // namespace
 
-void add_calibration(CLI::App& app, int& exit_status) {
+void add_calibration(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb =
+  const Verb verb =
       app.add_subcommand("calibration", "Which calibration a cell has; puts a new one in its place");
-  verb->require_subcommand(1);
-  verb->footer(help);
-  subcommand(*verb, "history", "All that were active, the present one with a star", options, exit_status,
+  verb.require_subcommand();
+  verb.footer(help);
+  subcommand(verb, "history", "All that were active, the present one with a star", options, exit_status,
              history_of);
-  CLI::App* put = subcommand(*verb, "activate", "Puts a camera's new calibration in the place of the old one",
-                             options, exit_status, activate);
-  put->add_option("--camera", options->camera, "name of the camera in the cell")->required();
-  put->add_option("--from", options->from, "JSON of the camera as calibrate writes it with --output")
-      ->required();
-  put->add_option("--why", options->why, "what is kept in the history")->required();
-  put->add_flag("--internals-only", options->internals_only, "the camera keeps the pose it has");
-  put->add_flag("--dry-run", options->dry_run, "only say what would change");
-  subcommand(*verb, "undo", "Goes back to what was active before", options, exit_status, undo);
+  const Verb put = subcommand(verb, "activate", "Puts a camera's new calibration in the place of the old one",
+                              options, exit_status, activate);
+  put.add_option("--camera", options->camera, "name of the camera in the cell").required();
+  put.add_option("--from", options->from, "JSON of the camera as calibrate writes it with --output")
+      .required();
+  put.add_option("--why", options->why, "what is kept in the history").required();
+  put.add_flag("--internals-only", options->internals_only, "the camera keeps the pose it has");
+  put.add_flag("--dry-run", options->dry_run, "only say what would change");
+  subcommand(verb, "undo", "Goes back to what was active before", options, exit_status, undo);
 }
 
 }  // namespace zeropose

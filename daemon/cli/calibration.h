@@ -2,11 +2,11 @@
 // back.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
 // Adds the verb; exit_status as in batch.h.
-void add_calibration(CLI::App& app, int& exit_status);
+void add_calibration(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

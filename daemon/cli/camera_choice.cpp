@@ -21,13 +21,13 @@ CameraOptions of_cell(const CameraChoice& options) {
 
 }  // namespace
 
-void add_choice(CLI::App& verb, CameraChoice& choice) {
+void add_choice(cli::Verb verb, CameraChoice& choice) {
   verb.add_option("--cell", choice.cell, "the cell file, with --camera");
   verb.add_option("--camera", choice.camera, "its name in the cell");
   verb.add_option("--address", choice.address, "of a GigE Vision camera, with --size");
   verb.add_option("--device", choice.device, "of a video device, with --size");
   verb.add_option("--folder", choice.folder, "of pictures, with --size");
-  verb.add_option("--size", choice.size, "WIDTHxHEIGHT of the picture, px")->delimiter('x')->expected(2);
+  verb.add_option("--size", choice.size, "WIDTHxHEIGHT of the picture, px").delimiter('x').expected(2);
 }
 
 CameraOptions chosen_camera(const CameraChoice& options) {

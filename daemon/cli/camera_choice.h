@@ -1,11 +1,11 @@
 // What the verbs about cameras have in common: which camera, its pictures' health, pictures as files.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "daemon/cli/answer.h"
+#include "daemon/cli/verb.h"
 #include "drivers/camera.h"
 #include "measure/picture_health.h"
 
@@ -16,7 +16,7 @@ struct CameraChoice {
   std::vector<int> size;
 };
 
-void add_choice(CLI::App& verb, CameraChoice& choice);
+void add_choice(cli::Verb verb, CameraChoice& choice);
 // Throws ConfigError of the cell file, std::invalid_argument when the choice names no camera.
 CameraOptions chosen_camera(const CameraChoice& choice);
 

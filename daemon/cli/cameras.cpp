@@ -165,40 +165,41 @@ Answer snapshot(const SnapshotOptions& options) {
   return {done, json, concat({options.out, "\n  ", health_text(health), "\n"})};
 }
 
-void add_list(CLI::App& cameras, int& exit_status) {
+void add_list(cli::Verb cameras, int& exit_status) {
   auto options = std::make_shared<ListOptions>();
-  CLI::App* verb = cameras.add_subcommand("list", "The cameras that can be reached from here");
-  verb->add_option("--cell", options->cell, "also says which cameras of this cell file are there");
-  verb->add_option("--interface", options->interface, "only this network interface");
-  verb->add_option("--seconds", options->seconds, "to wait for answers (1)")->check(CLI::Range(0.05, 60.0));
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, cameras [{driver, ..., cell}], "
-                 "cell [{camera, place, found}]");
-  verb->footer(list_help);
-  verb->callback(
+  const Verb verb = cameras.add_subcommand("list", "The cameras that can be reached from here");
+  verb.add_option("--cell", options->cell, "also says which cameras of this cell file are there");
+  verb.add_option("--interface", options->interface, "only this network interface");
+  verb.add_option("--seconds", options->seconds, "to wait for answers (1)").range(0.05, 60.0);
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, cameras [{driver, ..., cell}], "
+                "cell [{camera, place, found}]");
+  verb.footer(list_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return list(*options); }, options->json); });
 }
 
-void add_snapshot(CLI::App& cameras, int& exit_status) {
+void add_snapshot(cli::Verb cameras, int& exit_status) {
   auto options = std::make_shared<SnapshotOptions>();
-  CLI::App* verb = cameras.add_subcommand("snapshot", "One picture of a camera, without a daemon");
-  add_choice(*verb, *options);
-  verb->add_option("--out", options->out, "the PNG file to write")->required();
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, file, width_px, height_px, white, health");
-  verb->footer(snapshot_help);
-  verb->callback(
+  const Verb verb = cameras.add_subcommand("snapshot", "One picture of a camera, without a daemon");
+  add_choice(verb, *options);
+  verb.add_option("--out", options->out, "the PNG file to write").required();
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, file, width_px, height_px, white, health");
+  verb.footer(snapshot_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return snapshot(*options); }, options->json); });
 }
 
 }  // namespace
 
-void add_cameras(CLI::App& app, int& exit_status) {
-  CLI::App* cameras = app.add_subcommand("cameras", "Cameras without a daemon: list, snapshot, stream, test");
-  cameras->require_subcommand(1);
-  add_list(*cameras, exit_status);
-  add_snapshot(*cameras, exit_status);
-  add_cameras_run(*cameras, exit_status);
+void add_cameras(cli::Verb app, int& exit_status) {
+  const Verb cameras =
+      app.add_subcommand("cameras", "Cameras without a daemon: list, snapshot, stream, test");
+  cameras.require_subcommand();
+  add_list(cameras, exit_status);
+  add_snapshot(cameras, exit_status);
+  add_cameras_run(cameras, exit_status);
 }
 
 }  // namespace zeropose

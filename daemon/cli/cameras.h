@@ -1,10 +1,10 @@
 // The verbs cameras list and cameras snapshot: the cameras of a line without a daemon.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_cameras(CLI::App& app, int& exit_status);
+void add_cameras(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

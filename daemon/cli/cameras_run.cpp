@@ -146,44 +146,42 @@ Answer test(const TestOptions& options) {
   return {good ? done : no_answer, json, text};
 }
 
-void add_stream(CLI::App& cameras, int& exit_status) {
+void add_stream(cli::Verb cameras, int& exit_status) {
   auto options = std::make_shared<StreamOptions>();
-  CLI::App* verb = cameras.add_subcommand("stream", "Frames of a camera as they come, without a daemon");
-  add_choice(*verb, *options);
-  verb->add_option("--seconds", options->seconds, "how long (10)")->check(CLI::Range(0.1, 1e6));
-  verb->add_option("--frames", options->frames, "or until so many frames have come")
-      ->check(CLI::Range(1, 1000000000));
-  verb->add_option("--rate", options->rate_hz, "requests per second; without it as fast as frames come")
-      ->check(CLI::Range(0.01, 1000.0));
-  verb->add_option("--save", options->save, "a folder for the frames as PNG; made if it is not there");
-  verb->add_flag("--json", options->json, "one JSON object on stdout: status, reason, rate_hz, frames {...}");
-  verb->footer(stream_help);
-  verb->callback(
+  const Verb verb = cameras.add_subcommand("stream", "Frames of a camera as they come, without a daemon");
+  add_choice(verb, *options);
+  verb.add_option("--seconds", options->seconds, "how long (10)").range(0.1, 1e6);
+  verb.add_option("--frames", options->frames, "or until so many frames have come").range(1, 1000000000);
+  verb.add_option("--rate", options->rate_hz, "requests per second; without it as fast as frames come")
+      .range(0.01, 1000.0);
+  verb.add_option("--save", options->save, "a folder for the frames as PNG; made if it is not there");
+  verb.add_flag("--json", options->json, "one JSON object on stdout: status, reason, rate_hz, frames {...}");
+  verb.footer(stream_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return stream(*options); }, options->json); });
 }
 
-void add_test(CLI::App& cameras, int& exit_status) {
+void add_test(cli::Verb cameras, int& exit_status) {
   auto options = std::make_shared<TestOptions>();
-  CLI::App* verb =
+  const Verb verb =
       cameras.add_subcommand("test", "Whether the cameras of a cell will do, after some minutes of work");
-  verb->add_option("--cell", options->cell, "the cell file")->required();
-  verb->add_option("--camera", options->cameras, "only this one; again for more");
-  verb->add_option("--minutes", options->minutes, "how long (1)")->check(CLI::Range(0.01, 1e5));
-  verb->add_option("--seconds", options->seconds, "how long, instead of --minutes")
-      ->check(CLI::Range(0.1, 1e7));
-  verb->add_option("--rate", options->rate_hz, "rounds per second (5)")->check(CLI::Range(0.01, 1000.0));
-  verb->add_flag(
+  verb.add_option("--cell", options->cell, "the cell file").required();
+  verb.add_option("--camera", options->cameras, "only this one; again for more");
+  verb.add_option("--minutes", options->minutes, "how long (1)").range(0.01, 1e5);
+  verb.add_option("--seconds", options->seconds, "how long, instead of --minutes").range(0.1, 1e7);
+  verb.add_option("--rate", options->rate_hz, "rounds per second (5)").range(0.01, 1000.0);
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, findings [{camera, what, found, wanted, good, remedy}], "
       "cameras [{camera, asked, answered, ...}]");
-  verb->footer(test_help);
-  verb->callback(
+  verb.footer(test_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return test(*options); }, options->json); });
 }
 
 }  // namespace
 
-void add_cameras_run(CLI::App& cameras, int& exit_status) {
+void add_cameras_run(cli::Verb cameras, int& exit_status) {
   add_stream(cameras, exit_status);
   add_test(cameras, exit_status);
 }

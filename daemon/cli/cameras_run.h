@@ -1,10 +1,10 @@
 // The verbs cameras stream and cameras test: cameras at work, without a daemon.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_cameras_run(CLI::App& cameras, int& exit_status);
+void add_cameras_run(cli::Verb cameras, int& exit_status);
 
 }  // namespace zeropose

@@ -105,16 +105,16 @@ Answer convert_pose(const ConvertOptions& options) {
   return answer;
 }
 
-void add_pose(CLI::App& convert_verb, int& exit_status) {
+void add_pose(cli::Verb convert_verb, int& exit_status) {
   auto options = std::make_shared<ConvertOptions>();
-  CLI::App* verb =
+  const Verb verb =
       convert_verb.add_subcommand("pose", "Converts a pose from one maker's numbers to another's");
-  verb->add_option("--from", options->from, "the convention of the values")->required();
-  verb->add_option("--to", options->to, "the convention wanted")->required();
-  verb->add_option("VALUES", options->values, "6 numbers (abb: 7, matrix: 16), parted by blanks or commas");
-  verb->add_flag("--json", options->json, "one JSON object on stdout: status, reason, values, fields, X_AB");
-  verb->footer(convert_pose_help);
-  verb->callback(
+  verb.add_option("--from", options->from, "the convention of the values").required();
+  verb.add_option("--to", options->to, "the convention wanted").required();
+  verb.add_option("VALUES", options->values, "6 numbers (abb: 7, matrix: 16), parted by blanks or commas");
+  verb.add_flag("--json", options->json, "one JSON object on stdout: status, reason, values, fields, X_AB");
+  verb.footer(convert_pose_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return convert_pose(*options); }, options->json); });
 }
 
@@ -202,31 +202,31 @@ Answer convert_camera(const CameraOptions& options) {
   return answer;
 }
 
-void add_camera(CLI::App& convert_verb, int& exit_status) {
+void add_camera(cli::Verb convert_verb, int& exit_status) {
   auto options = std::make_shared<CameraOptions>();
-  CLI::App* verb = convert_verb.add_subcommand("camera", "Converts a camera file: OpenCV, ROS, zeropose");
-  const CLI::IsMember formats({"opencv", "ros", "zeropose"});
-  verb->add_option("--from", options->from, "what the file is")->required()->check(formats);
-  verb->add_option("--to", options->to, "what is wanted")->required()->check(formats);
-  verb->add_option("FILE", options->file, "the camera file; without it stdin");
-  verb->add_option("--name", options->name, "which camera of a zeropose file; what to call it otherwise");
-  verb->add_option("--output", options->output, "the file to write; without it stdout");
-  verb->add_flag("--replace", options->replace, "overwrite --output; the old file is kept as .previous");
-  verb->add_option("--model", options->model,
-                   "the lens model wanted; without it as it is, or brown where only "
-                   "that exists")
-      ->check(CLI::IsMember({"division", "brown"}));
-  verb->add_option("--max-residual-px", options->max_residual_px,
-                   "refuse a lens model that is wrong by more than this somewhere in the image (0.05)")
-      ->check(CLI::Range(0.0, 100.0));
-  verb->add_option("--width", options->width_px, "image width, for files that do not state it")
-      ->check(CLI::Range(1, 65535));
-  verb->add_option("--height", options->height_px, "image height, for files that do not state it")
-      ->check(CLI::Range(1, 65535));
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, camera, worst_px, warnings, text");
-  verb->footer(convert_camera_help);
-  verb->callback([options, &exit_status] {
+  const Verb verb = convert_verb.add_subcommand("camera", "Converts a camera file: OpenCV, ROS, zeropose");
+  const std::vector<std::string> formats = {"opencv", "ros", "zeropose"};
+  verb.add_option("--from", options->from, "what the file is").required().one_of(formats);
+  verb.add_option("--to", options->to, "what is wanted").required().one_of(formats);
+  verb.add_option("FILE", options->file, "the camera file; without it stdin");
+  verb.add_option("--name", options->name, "which camera of a zeropose file; what to call it otherwise");
+  verb.add_option("--output", options->output, "the file to write; without it stdout");
+  verb.add_flag("--replace", options->replace, "overwrite --output; the old file is kept as .previous");
+  verb.add_option("--model", options->model,
+                  "the lens model wanted; without it as it is, or brown where only "
+                  "that exists")
+      .one_of({"division", "brown"});
+  verb.add_option("--max-residual-px", options->max_residual_px,
+                  "refuse a lens model that is wrong by more than this somewhere in the image (0.05)")
+      .range(0.0, 100.0);
+  verb.add_option("--width", options->width_px, "image width, for files that do not state it")
+      .range(1, 65535);
+  verb.add_option("--height", options->height_px, "image height, for files that do not state it")
+      .range(1, 65535);
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, camera, worst_px, warnings, text");
+  verb.footer(convert_camera_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return convert_camera(*options); }, options->json);
   });
 }
@@ -254,12 +254,12 @@ Eigen::Vector2d cli::point_of_option(const std::string& text, const std::string&
   return {numbers[0], numbers[1]};
 }
 
-void add_convert(CLI::App& app, int& exit_status) {
-  CLI::App* verb = app.add_subcommand(
+void add_convert(cli::Verb app, int& exit_status) {
+  const Verb verb = app.add_subcommand(
       "convert", "Converts poses between robot makers' conventions, cameras between file formats");
-  verb->require_subcommand(1);
-  add_pose(*verb, exit_status);
-  add_camera(*verb, exit_status);
+  verb.require_subcommand();
+  add_pose(verb, exit_status);
+  add_camera(verb, exit_status);
 }
 
 }  // namespace zeropose

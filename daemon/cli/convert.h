@@ -1,15 +1,15 @@
 // zeropose convert: poses and cameras in other systems' forms (spec 92).
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
 
 #include "calib/rigid.h"
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_convert(CLI::App& app, int& exit_status);
+void add_convert(cli::Verb app, int& exit_status);
 
 namespace cli {
 

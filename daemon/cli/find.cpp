@@ -1,6 +1,5 @@
 #include "daemon/cli/find.h"
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cmath>
 #include <fstream>
@@ -15,6 +14,7 @@
 #include "daemon/cli/answer.h"
 #include "daemon/cli/grey_image.h"
 #include "daemon/cli/help.h"
+#include "daemon/cli/verb.h"
 #include "daemon/overlay.h"
 #include "measure/marks.h"
 #include "measure/pattern.h"
@@ -149,37 +149,35 @@ Answer find(const Options& options) {
   return {done, json, table_of_marks(marks.found)};
 }
 
-void add_options(CLI::App& verb, Options& options) {
+void add_options(cli::Verb verb, Options& options) {
   std::vector<std::string> words;
   for (const auto& [name, kind] : kinds) words.emplace_back(name);
   verb.add_option("--image", options.image, "PNG, JPEG, TIFF or PGM, 8 or 16 bit, colour is made grey")
-      ->required();
-  verb.add_option("--kind", options.kind, "what to look for (circle)")->check(CLI::IsMember(words));
-  auto* bright = verb.add_flag("--bright", options.search.bright, "brighter than what surrounds it");
-  verb.add_flag("--dark", options.dark, "darker than what surrounds it (default)")->excludes(bright);
+      .required();
+  verb.add_option("--kind", options.kind, "what to look for (circle)").one_of(words);
+  const VerbOption bright =
+      verb.add_flag("--bright", options.search.bright, "brighter than what surrounds it");
+  verb.add_flag("--dark", options.dark, "darker than what surrounds it (default)").excludes(bright);
   verb.add_option("--window", options.window, "x,y,w,h: first column and row, width and height, px")
-      ->delimiter(',')
-      ->expected(4);
-  verb.add_option("--min-diameter", options.min_diameter, "px (8)")->check(CLI::Range(3.0, 1e5));
+      .delimiter(',')
+      .expected(4);
+  verb.add_option("--min-diameter", options.min_diameter, "px (8)").range(3.0, 1e5);
   verb.add_option("--max-diameter", options.max_diameter,
                   "px (half of the picture, or the window's diagonal)")
-      ->check(CLI::Range(3.0, 1e5));
+      .range(3.0, 1e5);
   verb.add_option("--min-axis-ratio", options.search.min_axis_ratio, "shorter by longer axis (0.3)")
-      ->check(CLI::Range(0.01, 1.0));
-  verb.add_option("--min-contrast", options.search.min_contrast, "grey levels of 255 (15)")
-      ->check(CLI::Range(1.0, 255.0));
-  verb.add_option("--max-blur", options.search.max_blur_px, "sigma of the edges, px (4)")
-      ->check(CLI::Range(0.3, 20.0));
-  verb.add_option("--inner", options.inner, "ring: inner radii by the outer one, descending")->delimiter(',');
-  verb.add_option("--direction", options.direction, "degrees, see below (0)")
-      ->check(CLI::Range(-360.0, 360.0));
+      .range(0.01, 1.0);
+  verb.add_option("--min-contrast", options.search.min_contrast, "grey levels of 255 (15)").range(1.0, 255.0);
+  verb.add_option("--max-blur", options.search.max_blur_px, "sigma of the edges, px (4)").range(0.3, 20.0);
+  verb.add_option("--inner", options.inner, "ring: inner radii by the outer one, descending").delimiter(',');
+  verb.add_option("--direction", options.direction, "degrees, see below (0)").range(-360.0, 360.0);
   verb.add_option("--direction-tolerance", options.direction_tolerance, "degrees (180: any)")
-      ->check(CLI::Range(0.0, 180.0));
-  verb.add_option("--opening", options.opening, "degrees (90), within 20")->check(CLI::Range(10.0, 350.0));
+      .range(0.0, 180.0);
+  verb.add_option("--opening", options.opening, "degrees (90), within 20").range(10.0, 350.0);
   verb.add_option("--template", options.pattern, "picture of the patch to look for");
   verb.add_option("--click", options.click, "u,v: its point, px in the patch (its middle)")
-      ->delimiter(',')
-      ->expected(2);
+      .delimiter(',')
+      .expected(2);
   verb.add_option("--overlay", options.overlay, "writes a PNG of the picture with what was found");
   verb.add_flag("--json", options.json,
                 "one JSON object on stdout: status, reason, marks [{u_px, v_px, suu, svv, suv, diameter_px,\n"
@@ -188,12 +186,12 @@ void add_options(CLI::App& verb, Options& options) {
 
 }  // namespace
 
-void add_find(CLI::App& app, int& exit_status) {
+void add_find(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = app.add_subcommand("find", "Marks in a picture, to hundredths of a pixel");
-  add_options(*verb, *options);
-  verb->footer(find_help);
-  verb->callback(
+  const Verb verb = app.add_subcommand("find", "Marks in a picture, to hundredths of a pixel");
+  add_options(verb, *options);
+  verb.footer(find_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return find(*options); }, options->json); });
 }
 

@@ -1,10 +1,10 @@
 // The verb find: marks in a picture (spec 92).
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_find(CLI::App& app, int& exit_status);
+void add_find(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

@@ -113,23 +113,23 @@ Answer find(Options options) {
   return {good ? done : no_answer, board_json(result, options), summary_of(result, options)};
 }
 
-void add_options(CLI::App& verb, Options& options) {
+void add_options(cli::Verb verb, Options& options) {
   verb.add_option("--image", options.image, "PNG, JPEG, TIFF or PGM, 8 or 16 bit, colour is made grey")
-      ->required();
+      .required();
   verb.add_option("--rows", options.problem.rows, "rows of circles or inner corners")
-      ->required()
-      ->check(CLI::Range(2, 1000));
+      .required()
+      .range(2, 1000);
   verb.add_option("--cols", options.problem.cols, "circles or inner corners in a row")
-      ->required()
-      ->check(CLI::Range(2, 1000));
+      .required()
+      .range(2, 1000);
   verb.add_option("--pitch-mm", options.problem.pitch_mm,
                   "from circle to circle, or a square's side; asymmetric: from row to row")
-      ->required()
-      ->check(CLI::Range(1e-6, 1e6));
+      .required()
+      .range(1e-6, 1e6);
   verb.add_option("--board", options.board, "circles (default), asymmetric-circles or chessboard")
-      ->check(CLI::IsMember({"circles", "asymmetric-circles", "chessboard"}));
+      .one_of({"circles", "asymmetric-circles", "chessboard"});
   verb.add_option("--diameter-mm", options.diameter_mm, "of the circles: adds radius_mm to the points")
-      ->check(CLI::Range(1e-6, 1e6));
+      .range(1e-6, 1e6);
   verb.add_flag("--partial", options.problem.partial,
                 "accept any part of the board, counted from its own corner");
   verb.add_option("--csv", options.csv,
@@ -144,13 +144,13 @@ void add_options(CLI::App& verb, Options& options) {
 
 }  // namespace
 
-void add_find_board(CLI::App& app, int& exit_status) {
+void add_find_board(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb =
+  const Verb verb =
       app.add_subcommand("find-board", "A picture of a calibration board to points for calibrate");
-  add_options(*verb, *options);
-  verb->footer(find_board_help);
-  verb->callback(
+  add_options(verb, *options);
+  verb.footer(find_board_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return find(*options); }, options->json); });
 }
 

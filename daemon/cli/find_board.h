@@ -1,10 +1,10 @@
 // The verb find-board: a picture of a calibration board to points (spec 92).
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_find_board(CLI::App& app, int& exit_status);
+void add_find_board(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

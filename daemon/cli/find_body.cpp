@@ -101,16 +101,16 @@ Answer find(const Options& options) {
 
 namespace cli {
 
-void add_body_options(CLI::App& verb, BodyOptions& options) {
-  CLI::Option* camera =
+void add_body_options(cli::Verb verb, BodyOptions& options) {
+  const VerbOption camera =
       verb.add_option("--camera", options.camera, "camera JSON: the internals about as they are");
   verb.add_option("--camera-name", options.camera_name, "of the camera, where that file holds several");
   verb.add_option("--focal-px", options.focal_px,
                   "focal length in px within 20 %, where there is no camera file")
-      ->check(CLI::Range(1.0, 1e6))
-      ->excludes(camera);
+      .range(1.0, 1e6)
+      .excludes(camera);
   verb.add_option("--radius-mm", options.radius_mm, "of the marks whose radius the table does not say")
-      ->check(CLI::Range(1e-6, 1e6));
+      .range(1e-6, 1e6);
   verb.add_option("--overlay", options.overlay, "writes a PNG of the image with the marks and their numbers");
 }
 
@@ -168,21 +168,21 @@ std::vector<CalibrationPoint> calibration_points(const FoundBody& found) {
 
 }  // namespace cli
 
-void add_find_body(CLI::App& app, int& exit_status) {
+void add_find_body(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = app.add_subcommand("find-body", "A picture of a calibration body to numbered points");
-  verb->add_option("--image", options->body.image, "PNG, JPEG, TIFF or PGM, 8 or 16 bit, colour is made grey")
-      ->required();
-  verb->add_option("--body", options->body.body, "CSV: mark x_mm y_mm z_mm [radius_mm nx ny nz]")->required();
-  add_body_options(*verb, options->body);
-  verb->add_option("--csv", options->csv,
-                   "writes the points: mark x_mm y_mm z_mm u_px v_px suu svv suv radius_mm nx ny nz");
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, points [{mark, x_mm, y_mm, z_mm, u_px, v_px, "
-                 "suu, svv, suv,\n"
-                 "radius_mm, nx, ny, nz}], missing [mark], discs, explained, next_best");
-  verb->footer(find_body_help);
-  verb->callback(
+  const Verb verb = app.add_subcommand("find-body", "A picture of a calibration body to numbered points");
+  verb.add_option("--image", options->body.image, "PNG, JPEG, TIFF or PGM, 8 or 16 bit, colour is made grey")
+      .required();
+  verb.add_option("--body", options->body.body, "CSV: mark x_mm y_mm z_mm [radius_mm nx ny nz]").required();
+  add_body_options(verb, options->body);
+  verb.add_option("--csv", options->csv,
+                  "writes the points: mark x_mm y_mm z_mm u_px v_px suu svv suv radius_mm nx ny nz");
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, points [{mark, x_mm, y_mm, z_mm, u_px, v_px, "
+                "suu, svv, suv,\n"
+                "radius_mm, nx, ny, nz}], missing [mark], discs, explained, next_best");
+  verb.footer(find_body_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return find(*options); }, options->json); });
 }
 

@@ -2,17 +2,17 @@
 // body needs of it.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 #include "calib/calibration.h"
 #include "daemon/cli/answer.h"
+#include "daemon/cli/verb.h"
 #include "measure/body.h"
 
 namespace zeropose {
 
-void add_find_body(CLI::App& app, int& exit_status);
+void add_find_body(cli::Verb app, int& exit_status);
 
 namespace cli {
 
@@ -28,7 +28,7 @@ struct FoundBody {
 };
 
 // --focal-px, --camera, --radius-mm and --overlay.
-void add_body_options(CLI::App& verb, BodyOptions& options);
+void add_body_options(cli::Verb verb, BodyOptions& options);
 
 // Reads the files, and writes the overlay. Throws ConfigError, std::invalid_argument.
 FoundBody find_body_in(const BodyOptions& options);

@@ -86,19 +86,19 @@ Answer answer_of(const std::vector<FramePoint>& points, const MeasuredFrame& fra
 
 }  // namespace
 
-void add_frame(CLI::App& app, int& exit_status) {
+void add_frame(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = app.add_subcommand("frame", "A cell's world frame from points of a measuring system");
-  verb->add_option("--points", options->points, "CSV: point role x_mm y_mm z_mm")->required();
-  verb->add_option("--sigma-mm", options->sigma_mm,
-                   "of one measured coordinate; without it from the residuals, where there are any")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_flag(
+  const Verb verb = app.add_subcommand("frame", "A cell's world frame from points of a measuring system");
+  verb.add_option("--points", options->points, "CSV: point role x_mm y_mm z_mm").required();
+  verb.add_option("--sigma-mm", options->sigma_mm,
+                  "of one measured coordinate; without it from the residuals, where there are any")
+      .range(1e-6, 100.0);
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, X_TW, X_WT, sigma, sigma_mm, redundancy, residuals\n"
       "[{point, residual_mm}]");
-  verb->footer(frame_help);
-  verb->callback([options, &exit_status] {
+  verb.footer(frame_help);
+  verb.callback([options, &exit_status] {
     const auto answer = [&] {
       const std::vector<FramePoint> points = load_points(options->points);
       return answer_of(points, measured_frame(points, options->sigma_mm));

@@ -1,10 +1,10 @@
 // The verb frame: a cell's world in a measuring system's frame (docs/body.md).
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_frame(CLI::App& app, int& exit_status);
+void add_frame(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

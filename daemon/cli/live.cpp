@@ -178,27 +178,27 @@ void run_verb(const LiveOptions& options, int& exit_status, const std::function<
   }
 }
 
-CLI::App* live_verb(CLI::App& app, LiveOptions& options, const std::string& name, const std::string& text) {
-  CLI::App* verb = app.add_subcommand(name, text);
-  verb->add_option("--socket", options.socket, "the daemon's Unix socket")->capture_default_str();
-  verb->add_flag("--json", options.json, "exactly one JSON object on stdout");
+cli::Verb live_verb(cli::Verb app, LiveOptions& options, const std::string& name, const std::string& text) {
+  const cli::Verb verb = app.add_subcommand(name, text);
+  verb.add_option("--socket", options.socket, "the daemon's Unix socket").shows_default();
+  verb.add_flag("--json", options.json, "exactly one JSON object on stdout");
   return verb;
 }
 
 }  // namespace
 
-void add_live_verbs(CLI::App& app, int& exit_status) {
+void add_live_verbs(cli::Verb app, int& exit_status) {
   const auto options = std::make_shared<LiveOptions>();
-  auto* status =
+  const cli::Verb status =
       live_verb(app, *options, "status", "What the daemon knows: cameras, zero, ready or not and why");
-  status->add_option("--wait", options->wait_s, "seconds to wait for the daemon and all its cameras")
-      ->capture_default_str();
-  status->callback([options, &exit_status] {
+  status.add_option("--wait", options->wait_s, "seconds to wait for the daemon and all its cameras")
+      .shows_default();
+  status.callback([options, &exit_status] {
     run_verb(
         *options, exit_status, [&] { return status_within(*options); }, print_status);
   });
   live_verb(app, *options, "measure", "Measure once; no robot sees the result")
-      ->callback([options, &exit_status] {
+      .callback([options, &exit_status] {
         run_verb(
             *options, exit_status,
             [&] {
@@ -207,7 +207,7 @@ void add_live_verbs(CLI::App& app, int& exit_status) {
             print_measurement);
       });
   live_verb(app, *options, "zero", "Take the zero measurement: the object must stand in its ideal position")
-      ->callback([options, &exit_status] {
+      .callback([options, &exit_status] {
         run_verb(
             *options, exit_status,
             [&] {
@@ -215,12 +215,12 @@ void add_live_verbs(CLI::App& app, int& exit_status) {
             },
             print_zero);
       });
-  auto* snapshot =
+  const cli::Verb snapshot =
       live_verb(app, *options, "snapshot", "One frame of a camera as PNG, with search areas and found marks");
-  snapshot->add_option("--camera", options->camera, "the camera's name")->required();
-  snapshot->add_option("--out", options->out, "the PNG file to write")->required();
-  snapshot->add_flag("--plain", options->plain, "without search areas and marks");
-  snapshot->callback([options, &exit_status] {
+  snapshot.add_option("--camera", options->camera, "the camera's name").required();
+  snapshot.add_option("--out", options->out, "the PNG file to write").required();
+  snapshot.add_flag("--plain", options->plain, "without search areas and marks");
+  snapshot.callback([options, &exit_status] {
     run_verb(
         *options, exit_status,
         [&] {

@@ -208,19 +208,18 @@ Answer plan_of(const Options& options) {
 
 }  // namespace
 
-void add_plan(CLI::App& app, int& exit_status) {
+void add_plan(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = app.add_subcommand("plan", "What accuracy a cell's cameras and marks will give");
-  verb->add_option("--cell", options->cell, "the cell file")->required();
-  verb->add_option("--job", options->job, "name of the job (the first)");
-  verb->add_option("--sigma-px", options->sigma_px, "of a found mark, per axis, px (0.02)")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_flag(
+  const Verb verb = app.add_subcommand("plan", "What accuracy a cell's cameras and marks will give");
+  verb.add_option("--cell", options->cell, "the cell file").required();
+  verb.add_option("--job", options->job, "name of the job (the first)");
+  verb.add_option("--sigma-px", options->sigma_px, "of a found mark, per axis, px (0.02)").range(1e-6, 100.0);
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, code, job, sigma (mm, degrees), sigma_mm, hidden_mm,\n"
       "points, weak_directions, views, cameras; null: no limit");
-  verb->footer(plan_help);
-  verb->callback(
+  verb.footer(plan_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return plan_of(*options); }, options->json); });
 }
 

@@ -134,43 +134,39 @@ Answer cli::answer_of(const PointsOptions& options, const PointsInput& input, co
   return answer;
 }
 
-void cli::add_problem_options(CLI::App& verb, PointsOptions& options) {
-  verb.add_option("--width", options.width_px, "of the image, px")->check(CLI::Range(1, 65535));
-  verb.add_option("--height", options.height_px, "of the image, px")->check(CLI::Range(1, 65535));
+void cli::add_problem_options(cli::Verb verb, PointsOptions& options) {
+  verb.add_option("--width", options.width_px, "of the image, px").range(1, 65535);
+  verb.add_option("--height", options.height_px, "of the image, px").range(1, 65535);
   verb.add_option("--method", options.method, "the linear method that begins (auto)")
-      ->check(CLI::IsMember({"auto", "coplanar", "noncoplanar", "linear"}));
+      .one_of({"auto", "coplanar", "noncoplanar", "linear"});
   verb.add_option("--refine", options.refine, "the refinement (auto: by the number of points)")
-      ->check(CLI::IsMember({"auto", "none", "joint", "distortion-dominant", "origin-dominant"}));
+      .one_of({"auto", "none", "joint", "distortion-dominant", "origin-dominant"});
   verb.add_option("--residual", options.residual, "what is minimised (reprojection)")
-      ->check(CLI::IsMember({"reprojection", "algebraic"}));
+      .one_of({"reprojection", "algebraic"});
   verb.add_option("--model", options.model, "lens model (division, or as --start)")
-      ->check(CLI::IsMember({"division", "brown"}));
-  verb.add_option("--fix", options.fix, "parameters to hold, e.g. cx,cy or pose")->delimiter(',');
+      .one_of({"division", "brown"});
+  verb.add_option("--fix", options.fix, "parameters to hold, e.g. cx,cy or pose").delimiter(',');
   verb.add_option("--start", options.start, "camera JSON to start from; its pose too, where it has one");
   verb.add_option("--origin", options.origin, "CX,CY: image origin to begin with or to hold");
   verb.add_flag("--search-origin", options.search_origin, "search the image origin in any case");
   verb.add_option("--reject-px", options.reject_px, "drop points that deviate by more, worst first")
-      ->check(CLI::Range(0.0, 1e6));
-  verb.add_option("--reject-mm", options.reject_mm, "the same in mm at the point's distance")
-      ->check(CLI::Range(0.0, 1e6));
+      .range(0.0, 1e6);
+  verb.add_option("--reject-mm", options.reject_mm, "the same in mm at the point's distance").range(0.0, 1e6);
   verb.add_flag("--one-focal", options.one_focal, "fx = fy");
-  verb.add_option("--sigma-px", options.sigma_px, "noise of one pixel coordinate")
-      ->check(CLI::Range(0.0, 1e3));
+  verb.add_option("--sigma-px", options.sigma_px, "noise of one pixel coordinate").range(0.0, 1e3);
   verb.add_option("--robust", options.robust,
                   "Cauchy's loss from this many px (or sigmas) on: wrong points pull less")
-      ->check(CLI::Range(0.0, 1e3));
-  verb.add_option("--tz-mm", options.tz_mm, "distance of a board parallel to the chip")
-      ->check(CLI::Range(1e-3, 1e6));
+      .range(0.0, 1e3);
+  verb.add_option("--tz-mm", options.tz_mm, "distance of a board parallel to the chip").range(1e-3, 1e6);
 }
 
-void cli::add_answer_options(CLI::App& verb, PointsOptions& options) {
+void cli::add_answer_options(cli::Verb verb, PointsOptions& options) {
   verb.add_option("--pitch-mm", options.pitch_mm, "pixel pitch Sy: adds the data-sheet form")
-      ->check(CLI::Range(1e-6, 1.0));
+      .range(1e-6, 1.0);
   verb.add_option("--frame-offset-z-mm", options.frame_offset_z_mm,
                   "the camera's frame in the answer moved along its z axis")
-      ->check(CLI::Range(-1e5, 1e5));
-  verb.add_option("--angles", options.angles, "of the text for people (deg)")
-      ->check(CLI::IsMember({"deg", "rad"}));
+      .range(-1e5, 1e5);
+  verb.add_option("--angles", options.angles, "of the text for people (deg)").one_of({"deg", "rad"});
   verb.add_option("--active", options.active, "camera JSON in use, to compare with");
   verb.add_option("--name", options.name, "of the camera; which one of --start and --active is meant");
   verb.add_option("--output", options.output, "the camera JSON to write");

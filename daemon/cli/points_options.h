@@ -1,7 +1,6 @@
 // What calibrate points and calibrate ball share: options, the calibration's problem and its answer.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,6 +8,7 @@
 
 #include "calib/calibration.h"
 #include "daemon/cli/answer.h"
+#include "daemon/cli/verb.h"
 
 namespace zeropose::cli {
 
@@ -41,7 +41,7 @@ void refuse_contradictions(const PointsOptions& options);
 Answer answer_of(const PointsOptions& options, const PointsInput& input, const CalibrationResult& result,
                  const std::string& source);
 
-void add_problem_options(CLI::App& verb, PointsOptions& options);  // but --points
-void add_answer_options(CLI::App& verb, PointsOptions& options);
+void add_problem_options(cli::Verb verb, PointsOptions& options);  // but --points
+void add_answer_options(cli::Verb verb, PointsOptions& options);
 
 }  // namespace zeropose::cli

@@ -174,31 +174,27 @@ Answer recalibrate_camera(const RecalibrateOptions& options) {
 
 }  // namespace
 
-void add_recalibrate(CLI::App& app, int& exit_status) {
+void add_recalibrate(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<RecalibrateOptions>();
-  CLI::App* verb =
+  const Verb verb =
       app.add_subcommand("recalibrate", "Where a camera that was knocked is now, from fixed points");
-  verb->add_option("--method", options->method, "known, arbitrary or groups")
-      ->required()
-      ->check(CLI::IsMember({"known", "arbitrary", "groups"}));
-  verb->add_option("--camera", options->camera, "JSON of the camera as calibrated, with its X_WC")
-      ->required();
-  verb->add_option("--name", options->name, "of the camera, where the file holds several");
-  verb->add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
-  verb->add_flag("--replace", options->replace, "overwrite --output");
-  verb->add_option("--before", options->before, "CSV: point [group] u_px v_px before it was moved")
-      ->required();
-  verb->add_option("--after", options->after, "CSV: the same points after")->required();
-  verb->add_option("--points", options->points,
-                   "CSV: point x_mm y_mm z_mm in the world, or inside the group");
-  verb->add_option("--sigma-px", options->sigma_px, "noise of one pixel coordinate")
-      ->check(CLI::Range(1e-6, 100.0));
-  verb->add_flag(
+  verb.add_option("--method", options->method, "known, arbitrary or groups")
+      .required()
+      .one_of({"known", "arbitrary", "groups"});
+  verb.add_option("--camera", options->camera, "JSON of the camera as calibrated, with its X_WC").required();
+  verb.add_option("--name", options->name, "of the camera, where the file holds several");
+  verb.add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
+  verb.add_flag("--replace", options->replace, "overwrite --output");
+  verb.add_option("--before", options->before, "CSV: point [group] u_px v_px before it was moved").required();
+  verb.add_option("--after", options->after, "CSV: the same points after").required();
+  verb.add_option("--points", options->points, "CSV: point x_mm y_mm z_mm in the world, or inside the group");
+  verb.add_option("--sigma-px", options->sigma_px, "noise of one pixel coordinate").range(1e-6, 100.0);
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, code, X_WC, X_CoCn, sigma, covariance (6x6, mm and\n"
       "rad), deviations, removed, suspects, warnings");
-  verb->footer(recalibrate_help);
-  verb->callback([options, &exit_status] {
+  verb.footer(recalibrate_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return recalibrate_camera(*options); }, options->json);
   });
 }

@@ -5,11 +5,11 @@
 
 namespace zeropose {
 
-void add_robot(CLI::App& app, int& exit_status) {
-  CLI::App* robot = app.add_subcommand("robot", "A robot's side of the interface: monitor, test");
-  robot->require_subcommand(1);
-  add_robot_monitor(*robot, exit_status);
-  add_robot_check(*robot, exit_status);
+void add_robot(cli::Verb app, int& exit_status) {
+  const cli::Verb robot = app.add_subcommand("robot", "A robot's side of the interface: monitor, test");
+  robot.require_subcommand();
+  add_robot_monitor(robot, exit_status);
+  add_robot_check(robot, exit_status);
 }
 
 }  // namespace zeropose

@@ -1,10 +1,10 @@
 // zeropose robot: what a robot sees of the daemon, and whether it understands it.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_robot(CLI::App& app, int& exit_status);
+void add_robot(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

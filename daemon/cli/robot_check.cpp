@@ -295,26 +295,24 @@ Answer check_or_say_why_not(const CheckOptions& options) {
 
 }  // namespace
 
-void add_robot_check(CLI::App& robot, int& exit_status) {
+void add_robot_check(cli::Verb robot, int& exit_status) {
   auto options = std::make_shared<CheckOptions>();
-  CLI::App* verb = robot.add_subcommand("test", "Guided check of a robot's convention, axes and signs");
-  verb->add_option("--cell", options->cell, "the cell file that names the robot's convention");
-  verb->add_option("--robot", options->robot, "its name in the cell (the only one where there is one)");
-  verb->add_option("--convention", options->convention, "without a cell, or another one than in the cell");
-  verb->add_option("--robot-went", options->robot_went, "file with the robot's poses instead of typing them");
-  verb->add_option("--simulated", options->simulated,
-                   "control socket of the simulated cell that moves the object");
-  verb->add_option("--socket", options->socket, "control socket of the daemon that measures each place");
-  verb->add_option("--tolerance-mm", options->tolerance_mm, "that a shift may be off (3)")
-      ->check(CLI::Range(0.01, 50.0));
-  verb->add_option("--tolerance-deg", options->tolerance_deg, "that a turn may be off (1.5)")
-      ->check(CLI::Range(0.01, 5.0));
-  verb->add_flag(
+  const Verb verb = robot.add_subcommand("test", "Guided check of a robot's convention, axes and signs");
+  verb.add_option("--cell", options->cell, "the cell file that names the robot's convention");
+  verb.add_option("--robot", options->robot, "its name in the cell (the only one where there is one)");
+  verb.add_option("--convention", options->convention, "without a cell, or another one than in the cell");
+  verb.add_option("--robot-went", options->robot_went, "file with the robot's poses instead of typing them");
+  verb.add_option("--simulated", options->simulated,
+                  "control socket of the simulated cell that moves the object");
+  verb.add_option("--socket", options->socket, "control socket of the daemon that measures each place");
+  verb.add_option("--tolerance-mm", options->tolerance_mm, "that a shift may be off (3)").range(0.01, 50.0);
+  verb.add_option("--tolerance-deg", options->tolerance_deg, "that a turn may be off (1.5)").range(0.01, 5.0);
+  verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, convention, proven, places [{place, pose, measured, "
       "robot_went, agrees, off_mm, off_deg}], explanations, same_numbers, verdict");
-  verb->footer(check_help);
-  verb->callback([options, &exit_status] {
+  verb.footer(check_help);
+  verb.callback([options, &exit_status] {
     exit_status = run([&] { return check_or_say_why_not(*options); }, options->json);
   });
 }

@@ -1,10 +1,10 @@
 // zeropose robot test: the guided convention check of one robot.
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_robot_check(CLI::App& robot, int& exit_status);
+void add_robot_check(cli::Verb robot, int& exit_status);
 
 }  // namespace zeropose

@@ -1,7 +1,6 @@
 // Which robot the verbs about robots mean.
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <string>
 
 #include "config/cell.h"

@@ -142,24 +142,24 @@ int run_monitor(const MonitorOptions& options) {
 
 }  // namespace
 
-void add_robot_monitor(CLI::App& robot, int& exit_status) {
+void add_robot_monitor(cli::Verb robot, int& exit_status) {
   auto options = std::make_shared<MonitorOptions>();
-  CLI::App* verb =
+  const Verb verb =
       robot.add_subcommand("monitor", "A robot's result block over Modbus TCP, decoded, as it changes");
-  verb->add_option("--cell", options->cell, "the cell file that says where the robot's link listens");
-  verb->add_option("--robot", options->robot, "its name in the cell (the only one where there is one)");
-  verb->add_option("--address", options->address, "numeric address instead, or another one than in the cell");
-  verb->add_option("--port", options->port, "TCP port (1502)")->check(CLI::Range(1, 65535));
-  verb->add_option("--unit", options->unit, "unit id (1)")->check(CLI::Range(1, 247));
-  verb->add_option("--data-id", options->data_id, "in the block's CRC (0x5A50)")->check(CLI::Range(0, 65535));
-  verb->add_option("--period-ms", options->period_ms, "between two looks (50)")->check(CLI::Range(5, 60000));
-  verb->add_option("--timeout-ms", options->timeout_ms, "for connecting, and for an answer (1000)")
-      ->check(CLI::Range(10, 60000));
-  verb->add_option("--count", options->count, "end after so many lines");
-  verb->add_option("--seconds", options->seconds, "end after this time")->check(CLI::Range(0.001, 1e7));
-  verb->add_flag("--json", options->json, "each line a JSON object: seconds, status, reason, block {...}");
-  verb->footer(monitor_help);
-  verb->callback([options, &exit_status] { exit_status = run_monitor(*options); });
+  verb.add_option("--cell", options->cell, "the cell file that says where the robot's link listens");
+  verb.add_option("--robot", options->robot, "its name in the cell (the only one where there is one)");
+  verb.add_option("--address", options->address, "numeric address instead, or another one than in the cell");
+  verb.add_option("--port", options->port, "TCP port (1502)").range(1, 65535);
+  verb.add_option("--unit", options->unit, "unit id (1)").range(1, 247);
+  verb.add_option("--data-id", options->data_id, "in the block's CRC (0x5A50)").range(0, 65535);
+  verb.add_option("--period-ms", options->period_ms, "between two looks (50)").range(5, 60000);
+  verb.add_option("--timeout-ms", options->timeout_ms, "for connecting, and for an answer (1000)")
+      .range(10, 60000);
+  verb.add_option("--count", options->count, "end after so many lines");
+  verb.add_option("--seconds", options->seconds, "end after this time").range(0.001, 1e7);
+  verb.add_flag("--json", options->json, "each line a JSON object: seconds, status, reason, block {...}");
+  verb.footer(monitor_help);
+  verb.callback([options, &exit_status] { exit_status = run_monitor(*options); });
 }
 
 }  // namespace zeropose

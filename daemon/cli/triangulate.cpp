@@ -1,6 +1,5 @@
 #include "daemon/cli/triangulate.h"
 
-#include <CLI/CLI.hpp>
 #include <memory>
 #include <sstream>
 
@@ -8,6 +7,7 @@
 #include "config/tables.h"
 #include "config/text.h"
 #include "daemon/cli/answer.h"
+#include "daemon/cli/verb.h"
 #include "measure/triangulation.h"
 
 namespace zeropose {
@@ -110,20 +110,19 @@ Answer places(const TriangulateOptions& options) {
 
 }  // namespace
 
-void add_triangulate(CLI::App& app, int& exit_status) {
+void add_triangulate(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<TriangulateOptions>();
-  CLI::App* verb = app.add_subcommand("triangulate", "The places of points that several cameras see");
-  verb->add_option("--cameras", options->cameras,
-                   "JSON {\"name\": camera, ...} with model, internals and X_WC")
-      ->required();
-  verb->add_option("--observations", options->observations, "CSV: camera point u_px v_px [suu svv suv]")
-      ->required();
-  verb->add_flag(
-      "--json", options->json,
-      "one JSON object on stdout: status, reason, points [{point, code, reason, p_W [x, y, z] mm,\n"
-      "covariance (3x3, mm^2), ray_gap_mm, deviations [{camera, dev_px}]}]");
-  verb->footer(help);
-  verb->callback(
+  const Verb verb = app.add_subcommand("triangulate", "The places of points that several cameras see");
+  verb.add_option("--cameras", options->cameras,
+                  "JSON {\"name\": camera, ...} with model, internals and X_WC")
+      .required();
+  verb.add_option("--observations", options->observations, "CSV: camera point u_px v_px [suu svv suv]")
+      .required();
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, points [{point, code, reason, p_W [x, y, z] mm,\n"
+                "covariance (3x3, mm^2), ray_gap_mm, deviations [{camera, dev_px}]}]");
+  verb.footer(help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return places(*options); }, options->json); });
 }
 

@@ -159,22 +159,22 @@ Answer verify_cell(const Options& options) {
 
 }  // namespace
 
-void add_verify(CLI::App& app, int& exit_status) {
+void add_verify(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<Options>();
-  CLI::App* verb = app.add_subcommand("verify", "A cell against points that another system measured");
-  verb->add_option("--cell", options->cell, "the cell file")->required();
-  verb->add_option("--points", options->points, "CSV: mark or point, x_mm y_mm z_mm measured in the world")
-      ->required();
-  CLI::Option* state =
-      verb->add_option("--state", options->state, "the daemon's state directory, with the zero");
-  verb->add_option("--pose", options->pose, "x,y,z,rx,ry,rz: X_WO instead of a zero")->excludes(state);
-  verb->add_option("--job", options->job, "its name (the first one)");
-  verb->add_option("--max-mm", options->max_mm, "largest error of a point (1)")->check(CLI::Range(1e-6, 1e6));
-  verb->add_flag("--json", options->json,
-                 "one JSON object on stdout: status, reason, verdict, date, X_WO, points [{point, error_mm,\n"
-                 "distance_mm, compensated_mm}], worst, worst_mm, rms_mm, mean_mm, max_mm, zero_time");
-  verb->footer(verify_help);
-  verb->callback(
+  const Verb verb = app.add_subcommand("verify", "A cell against points that another system measured");
+  verb.add_option("--cell", options->cell, "the cell file").required();
+  verb.add_option("--points", options->points, "CSV: mark or point, x_mm y_mm z_mm measured in the world")
+      .required();
+  const VerbOption state =
+      verb.add_option("--state", options->state, "the daemon's state directory, with the zero");
+  verb.add_option("--pose", options->pose, "x,y,z,rx,ry,rz: X_WO instead of a zero").excludes(state);
+  verb.add_option("--job", options->job, "its name (the first one)");
+  verb.add_option("--max-mm", options->max_mm, "largest error of a point (1)").range(1e-6, 1e6);
+  verb.add_flag("--json", options->json,
+                "one JSON object on stdout: status, reason, verdict, date, X_WO, points [{point, error_mm,\n"
+                "distance_mm, compensated_mm}], worst, worst_mm, rms_mm, mean_mm, max_mm, zero_time");
+  verb.footer(verify_help);
+  verb.callback(
       [options, &exit_status] { exit_status = run([&] { return verify_cell(*options); }, options->json); });
 }
 

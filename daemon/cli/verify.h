@@ -1,10 +1,10 @@
 // The verb verify: a cell against another measuring system (spec 92).
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "daemon/cli/verb.h"
 
 namespace zeropose {
 
-void add_verify(CLI::App& app, int& exit_status);
+void add_verify(cli::Verb app, int& exit_status);
 
 }  // namespace zeropose

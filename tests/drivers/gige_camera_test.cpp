@@ -111,12 +111,19 @@ TEST_F(OneCamera, FramesOfARunningCameraAreNotHandedOut) {
   EXPECT_GE(camera_.statistics().stale, 1u);
   simulated_.server().run_free(0, 0);
   camera_.start();
+  int refused = 0;
   for (int i = 0; i < 5; ++i) {
     const std::uint64_t scene = simulated_.new_scene();
-    const auto frame = triggered_frame(camera_);
-    ASSERT_TRUE(frame);
-    EXPECT_EQ(number_of(*frame).scene, scene);
+    try {
+      const auto frame = triggered_frame(camera_);
+      ASSERT_TRUE(frame);
+      EXPECT_EQ(number_of(*frame).scene, scene);
+    } catch (const DeviceError& error) {  // the last one nobody asked for was still on its way at the start
+      EXPECT_THAT(error.what(), HasSubstr("the stream is begun anew"));
+      ++refused;
+    }
   }
+  EXPECT_LE(refused, 1);
 }
 
 TEST_F(OneCamera, LostPacketsAreDamageNotAFrame) {
