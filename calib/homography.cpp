@@ -1,7 +1,8 @@
 #include "calib/homography.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
+
+#include "calib/symmetric_eigen.h"
 
 namespace zeropose {
 namespace {
@@ -68,10 +69,9 @@ struct Sums {
 
 // The direction in which nearly nothing is seen, or nothing if there are two such.
 std::optional<VectorXd> null_vector(const MatrixXd& lower) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(lower);
-  const VectorXd& values = eigen.eigenvalues();
-  if (eigen.info() != Eigen::Success || !(values[1] > 1e-9 * values[values.size() - 1])) return std::nullopt;
-  return eigen.eigenvectors().col(0);
+  const SymmetricEigen eigen = symmetric_eigen(lower);
+  if (!(eigen.values[1] > 1e-9 * eigen.values[eigen.values.size() - 1])) return std::nullopt;
+  return eigen.vectors.col(0);
 }
 
 }  // namespace

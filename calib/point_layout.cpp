@@ -1,11 +1,11 @@
 #include "calib/point_layout.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <tuple>
 
+#include "calib/symmetric_eigen.h"
 #include "calib/words.h"
 
 namespace zeropose {
@@ -36,10 +36,10 @@ Plane plane_through(Points points, const std::vector<std::size_t>& chosen) {
     const Vector3d arm = points[i].p_W_mm - plane.centre;
     spread += arm * arm.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(spread / static_cast<double>(chosen.size()));
+  const SymmetricEigen eigen = symmetric_eigen(spread / static_cast<double>(chosen.size()));
   for (int k = 0; k < 3; ++k) {
-    plane.axes.col(k) = solver.eigenvectors().col(2 - k);
-    plane.extent(k) = std::sqrt(std::max(0.0, solver.eigenvalues()(2 - k)));
+    plane.axes.col(k) = eigen.vectors.col(2 - k);
+    plane.extent(k) = std::sqrt(std::max(0.0, eigen.values(2 - k)));
   }
   plane.axes.col(2) = plane.axes.col(0).cross(plane.axes.col(1));
   return plane;

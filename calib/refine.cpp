@@ -1,7 +1,6 @@
 #include "calib/refine.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 
 #include "calib/eccentricity.h"
 #include "calib/refine_equations.h"
+#include "calib/symmetric_eigen.h"
 #include "calib/words.h"
 
 namespace zeropose {
@@ -296,8 +296,7 @@ double correct_discs(std::span<const CalibrationPoint> points, const State& stat
 // The parameters with the largest parts in the direction that the points leave open.
 std::string undetermined(const MatrixXd& N, const std::vector<Parameter>& list) {
   std::string names;
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(N);
-  const VectorXd direction = solver.eigenvectors().col(0).cwiseAbs();
+  const VectorXd direction = symmetric_eigen(N).vectors.col(0).cwiseAbs();
   for (std::size_t k = 0; k < list.size(); ++k)
     if (direction(static_cast<Eigen::Index>(k)) > 0.3 * direction.maxCoeff())
       names += (names.empty() ? "" : ", ") + std::string(name_of(list[k]));

@@ -11,7 +11,8 @@ struct SymmetricEigen {
   Eigen::MatrixXd vectors;  // the unit vectors that belong to them, column by column
 };
 
-// Reads the lower triangle of M, n x n. Numbers that are not finite give results that are not.
+// Reads the lower triangle of M, n x n. Numbers that are not finite give results that are not; all are NaN
+// where the iteration does not end.
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& M);
 
 }  // namespace zeropose

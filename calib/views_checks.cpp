@@ -1,7 +1,6 @@
 #include "calib/views_checks.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -10,6 +9,7 @@
 #include <numeric>
 #include <optional>
 
+#include "calib/symmetric_eigen.h"
 #include "calib/words.h"
 
 namespace zeropose::bundle {
@@ -198,12 +198,12 @@ BestPlane best_plane(std::span<const Vector3d> points) {
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
   for (const Vector3d& p : points) squares += (p - mean) * (p - mean).transpose();
   squares /= count;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd{squares});
-  const Vector3d normal = eigen.eigenvectors().col(0), along = eigen.eigenvectors().col(2);
+  const SymmetricEigen eigen = symmetric_eigen(squares);
+  const Vector3d normal = eigen.vectors.col(0), along = eigen.vectors.col(2);
   BestPlane plane;
   plane.X_GP.linear() << along, normal.cross(along), normal;
   plane.X_GP.translation() = mean;
-  plane.spread = eigen.eigenvalues().reverse().cwiseMax(0).cwiseSqrt();
+  plane.spread = eigen.values.reverse().cwiseMax(0).cwiseSqrt();
   return plane;
 }
 

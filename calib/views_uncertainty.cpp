@@ -1,9 +1,9 @@
 #include "calib/views_uncertainty.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "calib/symmetric_eigen.h"
 #include "calib/views_checks.h"
 
 namespace zeropose::bundle {
@@ -81,17 +81,16 @@ Inverse inverse_of(const MatrixXd& M, const VectorXd& before) {
   // Scaled by what the diagonal was before the views took their share: what is then left of it, near the
   // arithmetic's noise, is nothing.
   const VectorXd scale = before.cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * M * scale.asDiagonal());
-  const VectorXd& values = eigen.eigenvalues();
-  inverse.weakest = eigen.eigenvectors().col(0);
+  const SymmetricEigen eigen = symmetric_eigen(scale.asDiagonal() * M * scale.asDiagonal());
+  const VectorXd& values = eigen.values;
+  inverse.weakest = eigen.vectors.col(0);
   inverse.regular = values[0] > 1e-13 * values[values.size() - 1];
   if (!inverse.regular) return inverse;
-  const MatrixXd half = scale.asDiagonal() * eigen.eigenvectors();
+  const MatrixXd half = scale.asDiagonal() * eigen.vectors;
   inverse.matrix = half * values.cwiseInverse().asDiagonal() * half.transpose();
   const VectorXd unit = M.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> scaled(unit.asDiagonal() * M * unit.asDiagonal(),
-                                                       Eigen::EigenvaluesOnly);
-  inverse.condition = scaled.eigenvalues()[values.size() - 1] / scaled.eigenvalues()[0];
+  const VectorXd scaled = symmetric_eigen(unit.asDiagonal() * M * unit.asDiagonal()).values;
+  inverse.condition = scaled[values.size() - 1] / scaled[0];
   return inverse;
 }
 

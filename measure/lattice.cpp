@@ -1,6 +1,5 @@
 #include "measure/lattice.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>

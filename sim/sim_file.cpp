@@ -80,6 +80,7 @@ SurveyDrive read_survey(JsonObject& object) {
   object.read("grey", survey.grey, NumberRange{0, 255});
   object.read("first_hand_pose", survey.X_RH_first);
   object.read("step_mm", survey.step_mm, 1e4);
+  object.read_optional("along_hand", survey.along_hand);
   object.read_optional("robot", [&](JsonObject& robot) { survey.errors = read_errors(robot); });
   return survey;
 }

@@ -17,7 +17,8 @@ constexpr int tries = 3;
 Pose survey_position(const SurveyDrive& survey, int position) {
   Pose X_RH = survey.X_RH_first;
   const Eigen::Vector3d steps(position % 3, position / 3 % 3, position / 9);
-  X_RH.translation() += steps.cwiseProduct(survey.step_mm);
+  const Eigen::Vector3d way = steps.cwiseProduct(survey.step_mm);
+  X_RH.translation() += survey.along_hand ? X_RH.linear() * way : way;
   return X_RH;
 }
 

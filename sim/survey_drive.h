@@ -13,7 +13,7 @@
 namespace zeropose {
 
 // From the truth file of a cell. The ball's centre is fixed in the hand, whose first position is X_RH_first;
-// the others follow along the axes of the robot's base.
+// the others follow along the axes of the robot's base or of the hand.
 struct SurveyDrive {
   std::string camera;     // that the grid is for
   std::size_t robot = 0;  // of the cell
@@ -21,6 +21,7 @@ struct SurveyDrive {
   double radius_mm = 0, grey = 0;
   Pose X_RH_first = Pose::Identity();
   Eigen::Vector3d step_mm = Eigen::Vector3d::Zero();
+  bool along_hand = false;
   RobotErrors errors;
 };
 

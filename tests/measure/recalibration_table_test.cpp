@@ -7,6 +7,7 @@
 
 #include "tests/measure/recalibration_scene.h"
 #include "tests/support/csv.h"
+#include "tests/support/sanitized.h"
 
 namespace zeropose {
 namespace {
@@ -16,11 +17,7 @@ using test::KnockedCamera;
 using test::Random;
 using Method = RecalibrationMethod;
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int trials = 30;
-#else
-constexpr int trials = 200;
-#endif
+constexpr int trials = test::sanitized ? 30 : 200;
 
 KnockedCamera knocked(const Pose& X_CoCn, std::vector<test::FixedPoint> layout) {
   KnockedCamera camera;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/measure/recalibration_scene.h"
+#include "tests/support/sanitized.h"
 #include "tests/support/synthetic_camera.h"
 
 namespace zeropose {
@@ -20,11 +21,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Method = RecalibrationMethod;
 
-#if defined(__SANITIZE_ADDRESS__)
-constexpr int trials = 200;
-#else
-constexpr int trials = 1000;
-#endif
+constexpr int trials = test::sanitized ? 200 : 1000;
 
 std::vector<Distortion> both_lenses() {
   return {Division{-0.29}, BrownConrady{-0.25, 0.3, 0.001, -0.0007, 0.1}};

@@ -4,14 +4,12 @@
 
 #include <cstddef>
 
+#include "tests/support/sanitized.h"
+
 namespace zeropose {
 
 constexpr std::size_t amount(std::size_t whole) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  return whole / 25;
-#else
-  return whole;
-#endif
+  return test::sanitized ? whole / 25 : whole;
 }
 
 }  // namespace zeropose
