@@ -6,8 +6,10 @@
 #include <sstream>
 
 #include "config/camera_file.h"
+#include "config/cell.h"
 #include "config/recalibration_tables.h"
 #include "daemon/cli/answer.h"
+#include "daemon/cli/measured_references.h"
 #include "daemon/cli/output.h"
 #include "measure/recalibration.h"
 
@@ -29,15 +31,20 @@ points.csv: point x_mm y_mm z_mm, optional group where names repeat from plate t
 The answer X_WC is the new pose of the camera, X_CoCn that of the new camera in the old one's frame, sigma and
 covariance belong to X_WC, along and about the world's axes (mm, degrees; the covariance mm and rad).
 --sigma-px is the noise of one pixel coordinate; without it the sigmas come from the residuals.
+With --cell and --measured instead of --camera, --before, --after, --points: camera --name of the cell, its reference
+points, their pixels at the zero measurement and now. measured.json is what `zeropose measure --json` answered; noise is
+the cell's reference_check sigma_px unless --sigma-px says otherwise.
 docs/recalibration.md says which points to choose.
-Example:
+Examples:
+  zeropose measure --json > measured.json
+  zeropose recalibrate --method known --cell cell.json --name camera2 --measured measured.json --output camera2.json
   zeropose recalibrate --method known --camera camera.json --before b.csv --after a.csv --points p.csv --json
-Nothing is activated: put X_WC into the calibration file and take a new zero measurement.
+Nothing is activated: give --output to zeropose calibration activate and take a new zero measurement.
 Exit status: 0 done, 1 the points cannot give an answer (status and reason say why), 2 wrong usage or
 unreadable input.)";
 
 struct RecalibrateOptions {
-  std::string method, camera, name, before, after, points, output;
+  std::string method, camera, name, before, after, points, cell, measured, output;
   double sigma_px = 0;
   bool replace = false, json = false;
 };
@@ -47,15 +54,22 @@ RecalibrationMethod method_of(const std::string& name) {
   return name == "groups" ? RecalibrationMethod::groups : RecalibrationMethod::arbitrary_points;
 }
 
+// A camera as calibrated, what it saw before and sees now, and the noise where it is known.
+struct Knock {
+  CameraFile camera;
+  std::vector<RecalibrationPoint> points;
+  double sigma_px = 0;
+};
+
 void require_fitting_options(const RecalibrateOptions& options, const CameraFile& camera) {
   const bool arbitrary = options.method == "arbitrary";
+  for (const auto& [value, option] :
+       {std::pair(&options.before, "--before"), std::pair(&options.after, "--after")})
+    if (value->empty()) throw std::invalid_argument(concat({option, " is required with --camera"}));
   if (!arbitrary && options.points.empty())
     throw std::invalid_argument("--points is required with --method " + options.method);
   if (arbitrary && !options.points.empty())
     throw std::invalid_argument("--points is not used with --method arbitrary, which takes no coordinates");
-  if (camera.camera.on_hand)
-    throw std::invalid_argument(
-        options.camera + ": the camera has X_HC, expected X_WC: one on a hand has no place of its own");
   if (!camera.has_pose)
     throw std::invalid_argument(options.camera +
                                 ": the camera has no X_WC, expected its pose before it moved");
@@ -153,21 +167,43 @@ std::string answer_text(const RecalibrationProblem& problem, const Recalibration
   return text.str();
 }
 
-Answer recalibrate_camera(const RecalibrateOptions& options) {
+Knock knock_of_tables(const RecalibrateOptions& options) {
   const CameraFile camera = load_camera(options.camera, options.name);
   require_fitting_options(options, camera);
+  return {camera, load_recalibration_points(method_of(options.method),
+                                            {options.before, options.after, options.points})};
+}
+
+Knock knock_of_cell(const RecalibrateOptions& options) {
+  const Cell cell = load_cell(options.cell);
+  const auto camera = std::ranges::find(cell.calibration, options.name, &CalibratedCamera::name);
+  if (camera == cell.calibration.end())
+    throw std::invalid_argument(
+        concat({options.cell, ": has no camera \"", options.name, "\"; name one by --name"}));
+  return {{*camera, true},
+          measured_references(cell, method_of(options.method), options.name, options.measured),
+          cell.references.sigma_px};
+}
+
+Answer recalibrate_camera(const RecalibrateOptions& options) {
+  if (options.cell.empty() == options.camera.empty())
+    throw std::invalid_argument(
+        "which camera? Give --camera with --before and --after, or --cell with --name and --measured");
+  const Knock knock = options.cell.empty() ? knock_of_tables(options) : knock_of_cell(options);
+  if (knock.camera.camera.on_hand)
+    throw std::invalid_argument(
+        concat({options.camera, options.cell,
+                ": the camera has X_HC, expected X_WC: one on a hand has no place of its own"}));
   RecalibrationProblem problem;
   problem.method = method_of(options.method);
-  problem.model = camera.camera.model;
-  problem.X_WCo = camera.camera.X_WC;
-  problem.sigma_px = options.sigma_px;
-  const auto points =
-      load_recalibration_points(problem.method, {options.before, options.after, options.points});
-  problem.points = points;
+  problem.model = knock.camera.camera.model;
+  problem.X_WCo = knock.camera.camera.X_WC;
+  problem.sigma_px = options.sigma_px > 0 ? options.sigma_px : knock.sigma_px;
+  problem.points = knock.points;
   if (!options.output.empty()) refuse_existing(options.output, options.replace);
   const RecalibrationResult result = recalibrate(problem);
   if (result.code == Code::ok && !options.output.empty())
-    write_moved_camera(options.output, camera, result.X_WCn);
+    write_moved_camera(options.output, knock.camera, result.X_WCn);
   return {result.code == Code::ok ? done : no_answer, answer_json(problem, result),
           answer_text(problem, result)};
 }
@@ -181,13 +217,21 @@ void add_recalibrate(cli::Verb app, int& exit_status) {
   verb.add_option("--method", options->method, "known, arbitrary or groups")
       .required()
       .one_of({"known", "arbitrary", "groups"});
-  verb.add_option("--camera", options->camera, "JSON of the camera as calibrated, with its X_WC").required();
+  const VerbOption camera =
+      verb.add_option("--camera", options->camera, "JSON of the camera as calibrated, with its X_WC");
   verb.add_option("--name", options->name, "of the camera, where the file holds several");
   verb.add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
   verb.add_flag("--replace", options->replace, "overwrite --output");
-  verb.add_option("--before", options->before, "CSV: point [group] u_px v_px before it was moved").required();
-  verb.add_option("--after", options->after, "CSV: the same points after").required();
-  verb.add_option("--points", options->points, "CSV: point x_mm y_mm z_mm in the world, or inside the group");
+  const VerbOption before =
+      verb.add_option("--before", options->before, "CSV: point [group] u_px v_px before it was moved");
+  const VerbOption after = verb.add_option("--after", options->after, "CSV: the same points after");
+  const VerbOption points = verb.add_option("--points", options->points,
+                                            "CSV: point x_mm y_mm z_mm in the world, or inside the group");
+  const VerbOption cell = verb.add_option("--cell", options->cell, "the cell file with the reference points");
+  const VerbOption measured =
+      verb.add_option("--measured", options->measured, "JSON: what zeropose measure --json answered");
+  measured.needs(cell), cell.needs(measured);
+  for (const VerbOption& table : {camera, before, after, points}) cell.excludes(table);
   verb.add_option("--sigma-px", options->sigma_px, "noise of one pixel coordinate").range(1e-6, 100.0);
   verb.add_flag(
       "--json", options->json,

@@ -18,8 +18,6 @@ using testing::HasSubstr;
 using Json = nlohmann::json;
 
 constexpr std::uint16_t job = 1;
-constexpr double max_error_mm = 0.4,
-                 max_error_deg = 0.012;  // of each car with the wrong calibration of seed 1
 
 Pose random_shift(std::mt19937_64& generator) {
   std::uniform_real_distribution<double> mm(-30, 30), deg(-0.2, 0.2);

@@ -5,6 +5,7 @@ import csv
 import json
 import math
 import pathlib
+import re
 import sys
 import unittest
 
@@ -163,6 +164,58 @@ class Recalibrate(Case):
         line = self.table("line.csv", "point,x_mm,y_mm,z_mm", [(n, i, 2 * i, 0) for i, n in enumerate(POINTS)])
         status, answer, _ = run_json(*self.arguments("known", before, after, line))
         self.assertEqual((status, answer["name"]), (1, "geometry_degenerate"))
+
+
+class FromWhatTheDaemonSaw(Case):
+    """The shipped car-body cell; what `zeropose measure --json` answers is made here."""
+    CELL = SOURCE / "config/cells/car-body.json"
+
+    def setUp(self):
+        super().setUp()
+        plain = [re.sub(r"//.*", "", (SOURCE / "config/cells" / name).read_text())
+                 for name in ("car-body.json", "car-body.calibration.json")]
+        cell, calibration = map(json.loads, plain)
+        self.camera = calibration["camera2"]
+        self.points = {r["name"]: r["position_mm"] for r in cell["reference_points"] if r["cameras"] == ["camera2"]}
+        self.references = [{"camera": "camera2", "point": name, "finding": "found",
+                            "before_px": self.seen(p, [0] * 6), "after_px": self.seen(p, CHANGE)}
+                           for name, p in self.points.items()]
+
+    def seen(self, p, change):
+        return list(pixel(into(change, into(self.camera["X_WC"], p)), self.camera))
+
+    def recalibrate(self, references, *more, name="camera2"):
+        measured = self.write("measured.json", json.dumps({"status": "not ok", "code": 601, "references": references}))
+        return ["recalibrate", "--method", "known", "--cell", self.CELL, "--name", name, "--measured", measured, *more]
+
+    def test_the_change_is_found_and_written(self):
+        status, answer, _ = run_json(*self.recalibrate(self.references, "--output", self.path("new.json")))
+        self.assertEqual((status, answer["reason"]), (0, ""))
+        self.expect_near(answer["X_CoCn"], CHANGE, 1e-4)
+        self.assertEqual([d["point"] for d in answer["deviations"]], list(self.points))
+        self.assertEqual(answer["sigma_px"], 0.05)  # the cell's
+        self.expect_near(json.loads(self.path("new.json").read_text())["camera2"]["X_WC"], answer["X_WC"], 1e-9)
+
+    def test_what_is_not_seen_any_more_is_left_out(self):
+        del self.references[1]["after_px"]
+        status, answer, _ = run_json(*self.recalibrate(self.references))
+        self.assertEqual((status, answer["status"]), (1, "failed"))
+        self.assertEqual(len(answer["deviations"]), 0)
+
+    def test_wrong_inputs(self):
+        self.expect_refused(run(*self.recalibrate(self.references, name="camera9")), 'no camera "camera9"', "--name")
+        self.expect_refused(run(*self.recalibrate(self.references, name="camera3")), 'no reference points of "camera3"')
+        unknown = [dict(self.references[0], point="R9"), *self.references[1:]]
+        self.expect_refused(run(*self.recalibrate(unknown)), "measured.json", '"R9"')
+        early = [{k: v for k, v in r.items() if k != "before_px"} for r in self.references]
+        self.expect_refused(run(*self.recalibrate(early)), "before_px", "zero measurement")
+        arguments = self.recalibrate(self.references)
+        self.write("measured.json", "{}")
+        self.expect_refused(run(*arguments), "measured.json", "zeropose measure --json")
+        self.path("measured.json").unlink()
+        self.expect_refused(run(*arguments), "no such file")
+        self.expect_refused(run(*arguments, "--before", "b.csv"), "--before")
+        self.expect_refused(run("recalibrate", "--method", "known"), "which camera?")
 
 
 class CalibratePose(Case):

@@ -80,7 +80,7 @@ class MarkLaws : public ::testing::TestWithParam<std::tuple<double, bool>> {
 
 TEST_P(MarkLaws, AShiftOfTheImageShiftsTheResultExactly) {
   for (const auto& [du, dv] : {std::pair(7, -3), std::pair(-8, 5)}) {
-    const Pixels moved = mapped(pixels_, [&, du = du, dv = dv](int u, int v) {
+    const Pixels moved = mapped(pixels_, [&](int u, int v) {
       return at(pixels_, std::clamp(u - du, 0, side - 1), std::clamp(v - dv, 0, side - 1));
     });
     MarkSearch search = search_;
