@@ -44,15 +44,6 @@ void warn_of_repetitions(const CalibrationProblem& problem, std::vector<std::str
                        " rows are exact repetitions: they add weight, but no knowledge");
 }
 
-void warn_of_size(const CalibrationProblem& problem, std::vector<std::string>& warnings) {
-  for (const CalibrationPoint& point : problem.points)
-    if (!in_image({problem.width_px, problem.height_px}, point.u_px)) {
-      warnings.push_back("pixels lie outside the image of " + number(problem.width_px) + " x " +
-                         number(problem.height_px) + ": is the size right?");
-      return;
-    }
-}
-
 void warn_of_plane(const CalibrationProblem& problem, const CalibrationResult& result,
                    std::vector<std::string>& warnings) {
   if (!result.diagnosis.coplanar) return;
@@ -134,7 +125,6 @@ void add_warnings(const CalibrationProblem& problem, const PointLayout& layout, 
   std::vector<std::string>& warnings = result.diagnosis.warnings;
   warn_of_units(layout, warnings);
   warn_of_repetitions(problem, warnings);
-  warn_of_size(problem, warnings);
   warn_of_plane(problem, result, warnings);
   warn_of_focal(result, warnings);
 }

@@ -14,6 +14,8 @@ using namespace hand_eye;
 
 // A robot whose poses are worse has no calibration.
 constexpr double plausible_mm = 5, plausible_deg = 1;
+constexpr double plausible_px = 1;          // marks and corners are found ten times better
+constexpr double max_removed_share = 0.34;  // of the views: more were not mistakes of single ones
 // A board's scale that is wrong by more is said, where it is sure.
 constexpr double notable_scale = 0.002, sure_sigmas = 3;
 // Below, the noise of pixels is none that a camera has.
@@ -228,8 +230,16 @@ void judge(const HandEyeProblem& problem, const WrongPoints& wrong, const std::v
   const bool plausible =
       robot_known(problem) ? std::isfinite(result.rms_mm)
                            : result.robot_sigma_mm <= plausible_mm && result.robot_sigma_deg <= plausible_deg;
-  if (wrong.agree && plausible && result.suspects.empty()) return;
+  const bool most_agree = max_removed_share * static_cast<double>(problem.views.size()) >=
+                          static_cast<double>(result.removed.size());
+  const bool points_fit = problem.sigma_px > 0 || result.sigma_px <= plausible_px;
+  if (wrong.agree && plausible && most_agree && points_fit && result.suspects.empty()) return;
   result.status = HandEyeStatus::contradiction;
+  if (!points_fit) {
+    result.reason = "in the views the points miss their pixels by " + number(result.sigma_px) +
+                    " px: are these this camera's internals and this board's points?";
+    return;
+  }
   result.reason = "robot and pictures contradict each other by " + number(result.rms_mm) + " mm and " +
                   number(result.rms_deg, 3) + " degrees (root mean square)";
   const std::string known = explanation(problem, seen);
@@ -238,6 +248,9 @@ void judge(const HandEyeProblem& problem, const WrongPoints& wrong, const std::v
   else if (plausible && !result.suspects.empty())
     result.reason += ", wrong is one of views " + names_of(problem, result.suspects) +
                      ": the robot was moving, or its pose is another view's; repeat them, or add views";
+  else if (!most_agree)
+    result.reason += ", and agree only without " + number(result.removed.size()) + " of " +
+                     number(problem.views.size()) + " views: repeat them";
   else if (plausible)
     result.reason += ", more than the stated noise allows, and no single view explains it";
   else

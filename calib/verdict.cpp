@@ -106,6 +106,16 @@ Finding judge_rejected(const CalibrationResult& result) {
           number(rejected) + " of " + number(all) + " points were rejected (" + percent(share) + ")"};
 }
 
+Finding judge_size(const CalibrationProblem& problem) {
+  const auto outside = std::ranges::count_if(problem.points, [&](const CalibrationPoint& point) {
+    return !in_image({problem.width_px, problem.height_px}, point.u_px);
+  });
+  if (outside == 0) return {};
+  return {Quality::not_usable, number(static_cast<std::size_t>(outside)) +
+                                   " pixels lie outside the image of " + number(problem.width_px) + " x " +
+                                   number(problem.height_px) + ": is the size right?"};
+}
+
 Finding judge_image(const Coverage& coverage) {
   const Quality quality = at_least(coverage.area, image_share);
   std::string text = "the points cover " + percent(coverage.area) + " of the image and reach " +
@@ -209,9 +219,13 @@ CalibrationVerdict judge(const CalibrationProblem& problem, const CalibrationRes
   }
   const Coverage coverage = coverage_of(problem, result);
   const ReportedUncertainty uncertainty = reported_uncertainty(result.uncertainty, result.X_WC);
-  std::array findings{judge_fit(problem, result),     judge_redundancy(result, further_unknowns),
-                      judge_rejected(result),         judge_image(coverage),
-                      judge_depth(coverage),          judge_origin(problem, uncertainty),
+  std::array findings{judge_fit(problem, result),
+                      judge_redundancy(result, further_unknowns),
+                      judge_rejected(result),
+                      judge_image(coverage),
+                      judge_size(problem),
+                      judge_depth(coverage),
+                      judge_origin(problem, uncertainty),
                       judge_correlations(uncertainty)};
   for (Finding& finding : findings)
     if (!finding.text.empty()) verdict.findings.push_back(std::move(finding));

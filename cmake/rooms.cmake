@@ -4,9 +4,6 @@ find_package(Threads REQUIRED)
 add_library(zeropose_flags INTERFACE)
 target_include_directories(zeropose_flags INTERFACE ${PROJECT_SOURCE_DIR})
 target_compile_options(zeropose_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor -Werror)
-if(CMAKE_CXX_COMPILER_ID MATCHES "Clang")
-  target_compile_options(zeropose_flags INTERFACE -Wno-sign-conversion)  # no part of -Wconversion with g++
-endif()
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT CMAKE_DISABLE_PRECOMPILE_HEADERS)
   target_compile_options(zeropose_flags INTERFACE -fpch-preprocess)  # for ccache
 endif()

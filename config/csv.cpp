@@ -134,6 +134,12 @@ void CsvTable::read_header(const CsvColumns& columns) {
     return;
   }
   const std::string place = concat({file_, ":", std::to_string(header_line_), ": "});
+  if (header_.size() == 1 && header_.front().find_first_of(";\t") != std::string::npos) {
+    mistakes_ = {concat({place, "the columns are parted by ",
+                         header_.front().find(';') != std::string::npos ? "semicolons" : "tabs",
+                         ", expected commas, and decimal points in the numbers"})};
+    return;
+  }
   for (const std::string_view column : columns.required)
     if (!has(column)) mistakes_.push_back(concat({place, "found no column ", column, ", expected it"}));
   for (auto column = header_.begin(); column != header_.end(); ++column) {

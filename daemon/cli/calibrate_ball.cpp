@@ -130,6 +130,11 @@ std::string doubt_of(const BallOptions& options, const BallPlaces& places) {
 
 std::vector<std::string> warnings_of(const BallPlaces& places, const CalibrationResult& result) {
   std::vector<std::string> warnings = doubtful_units(places.X_RH);
+  if (const double tool_mm = places.centre_mm.norm();
+      !places.in_hand && tool_mm > 0 && (tool_mm < 1 || tool_mm > 5000))
+    warnings.push_back(concat({"--tool: the ball is ", number(tool_mm, 4),
+                               " mm from the flange: expected mm. In a grid the ",
+                               "hand does not turn, and nothing else shows a wrong tool"}));
   std::string missing;
   for (const std::string& view : places.without_pixel) missing += (missing.empty() ? "" : ", ") + view;
   if (!missing.empty())

@@ -74,6 +74,31 @@ void tell_progress(const Json& now, std::size_t& told, std::string& problem) {
   problem = fresh;
 }
 
+// What cannot succeed is refused before a robot starts.
+void refuse_contradictions(const Options& options) {
+  if (options.robot == options.points)
+    throw std::invalid_argument("--robot and --points: expected two files");
+  if (options.target == "ball") {
+    if (!(options.min_diameter_px > 0 && options.max_diameter_px > options.min_diameter_px))
+      throw std::invalid_argument(
+          "--target ball: expected --min-diameter-px above 0 and a larger --max-diameter-px");
+    return;
+  }
+  if (options.rows < 2 || options.cols < 2 || !(options.pitch_mm > 0))
+    throw std::invalid_argument(
+        concat({"--target ", options.target, ": expected --rows, --cols (2 and more) and --pitch-mm"}));
+  if (options.target == "circles")
+    throw std::invalid_argument(
+        "--target circles: the board looks the same from two sides or four, so that its frame turns from "
+        "picture to "
+        "picture; take asymmetric-circles with an odd number of rows");
+  if (options.target == "asymmetric-circles" && options.rows % 2 == 0)
+    throw std::invalid_argument(
+        "--target asymmetric-circles: with an even number of rows the board looks the same from two sides; "
+        "take one with "
+        "an odd number");
+}
+
 Json gathered(const Options& options) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(options.patience_s);
   std::size_t told = 0;
@@ -116,6 +141,7 @@ std::string points_table(const Json& views, bool ball) {
 }
 
 Answer survey(const Options& options) {
+  refuse_contradictions(options);
   for (const std::string& path : {options.robot, options.points}) refuse_existing(path, options.replace);
   ask_daemon(options, {{"cmd", "survey-start"},
                        {"camera", options.camera},

@@ -24,8 +24,8 @@ constexpr const char* help =
     R"(Calibrating writes files and changes nothing; a cell believes a new calibration from the moment on at which it
 is activated here. What was active before is kept beside the calibration file, in FILE.history/, and undo goes
 back to it, step by step. activate says what changes and where the camera looks to now; --dry-run says no more.
-Afterwards restart the daemon and take a new zero measurement: the old one was made with another calibration,
-and until then no robot gets anything.
+Afterwards restart the daemon, which goes on with the old calibration until then, and take a new zero measurement: the old
+one was made with another calibration, and a restarted daemon gives no robot anything before.
 Examples:
   zeropose calibrate points --points p.csv --width 768 --height 572 --output new.json
   zeropose calibration activate --cell cell.json --camera camera1 --from new.json --why "lens exchanged"
@@ -35,7 +35,9 @@ Exit status: 0 done, 1 there is nothing to go back to, 2 wrong usage, unreadable
 cell does not accept.)";
 
 constexpr const char* afterwards =
-    "restart the daemon and take a new zero measurement; until then no robot gets anything";
+    "restart the daemon: until then it goes on with the old calibration. Then take a new zero measurement; "
+    "before that no "
+    "robot gets anything";
 
 struct Options {
   std::string cell, camera, from, why;

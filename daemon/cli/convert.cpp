@@ -249,8 +249,8 @@ Eigen::Vector3d cli::place_of_option(const std::string& text, const std::string&
 Eigen::Vector2d cli::point_of_option(const std::string& text, const std::string& option) {
   const std::vector<double> numbers = parse_numbers(text, option);
   if (numbers.size() != 2)
-    throw std::invalid_argument(
-        concat({option, ": found ", std::to_string(numbers.size()), " numbers, expected 2: U,V"}));
+    throw std::invalid_argument(concat(
+        {option, ": found ", std::to_string(numbers.size()), " numbers, expected 2, parted by a comma"}));
   return {numbers[0], numbers[1]};
 }
 

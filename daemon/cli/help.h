@@ -82,8 +82,8 @@ Example: all there is for one view
 Exit status: 0 done, 1 no board found (with the reason), 2 wrong usage or unreadable input.)";
 
 inline constexpr const char* find_help =
-    R"(All marks of the kind in the window (without --window in the whole picture), the highest contrast first; slots, crosses,
-corners, edges and templates only where there is one. Pixel
+    R"(All marks of the kind in the window (without --window in the whole picture), the highest contrast first; of a
+template only the best one. Pixel
 (0, 0) is the centre of the top-left pixel; suu svv suv is the covariance of the place in px^2. Kinds:
   circle    flat disc or hole, --bright or --dark (default): centre of its ellipse
   ring      circles about one centre: --inner 0.6 or --inner 0.7,0.35 are the inner ones' radii by the outer one's

@@ -152,7 +152,8 @@ Json status_within(const LiveOptions& options) {
     try {
       const Json answer = question(options, {{"cmd", "status"}});
       const auto& cameras = answer["cameras"];
-      const bool all = std::all_of(cameras.begin(), cameras.end(),
+      const bool all = !cameras.empty() &&  // as in a daemon that has just begun
+                       std::all_of(cameras.begin(), cameras.end(),
                                    [](const Json& camera) { return camera["alive"].get<bool>(); });
       if (last || all) return answer;
     } catch (const std::runtime_error&) {

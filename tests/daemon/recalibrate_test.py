@@ -133,6 +133,14 @@ class Recalibrate(Case):
         out = run(*self.arguments("known", *self.pixels(CHANGE, "P3"), self.world()))[1]
         self.assertIn("P3  left out: it moved itself", out)
 
+    def test_another_camera_is_refused(self):
+        tables = [*self.pixels(CHANGE), self.world()]
+        self.camera = self.write("other.json", json.dumps(dict(CAMERA, X_WC=[900, -1500, 2100, -130, 12, 95])))
+        status, answer, _ = run_json(*self.arguments("known", *tables), "--output", self.path("new.json"))
+        self.assertEqual((status, answer["X_WC"]), (1, None))
+        self.assertIn("is this the camera", answer["reason"])
+        self.assertFalse(self.path("new.json").exists())
+
     def test_wrong_tables(self):
         before, after = self.pixels(CHANGE)
         world = self.world()
