@@ -21,7 +21,6 @@ constexpr double assumed_sigma_px = 0.1;    // of a pixel where nothing tells
 constexpr double plausible_rms_px = 5;      // points that leave more are not those that they are taken for
 constexpr double turned_only_rms_px = 0.3;  // more between the points, and the camera did not only turn
 constexpr double outdated_px = 1;           // the calibrated pose misses the pixels before by more: a warning
-constexpr double another_px = 50;           // by more than this: not this camera, or not these points
 constexpr double line_share = 1e-3;      // points nearer to a line than this share of their extent lie on it
 constexpr double parallel_rad = 1e-4;    // directions within this are one
 constexpr double max_sigma_share = 0.3;  // a change known no better, rad or share of the distance, is a guess
@@ -146,12 +145,6 @@ void look_at_old_pixels(const RecalibrationProblem& problem, RecalibrationResult
   }
   const auto used = std::ranges::count_if(result.deviations, &RecalibrationDeviation::used);
   const double rms_px = std::sqrt(sum / static_cast<double>(std::max<std::ptrdiff_t>(used, 1)));
-  if (!(rms_px <= another_px) && result.code == Code::ok) {
-    result.code = Code::deviation_not_attributable;
-    result.reason =
-        "the calibrated pose misses the pixels before by " + number(rms_px) +
-        " px (root mean square): is this the camera, and are these its points, in mm of the world?";
-  }
   if (!(rms_px <= outdated_px))
     result.warnings.push_back("the calibrated pose misses the pixels before by " + number(rms_px) +
                               " px (root mean square): the change contains what was wrong with it");

@@ -36,8 +36,7 @@ cell does not accept.)";
 
 constexpr const char* afterwards =
     "restart the daemon: until then it goes on with the old calibration. Then take a new zero measurement; "
-    "before that no "
-    "robot gets anything";
+    "before that no robot gets anything";
 
 struct Options {
   std::string cell, camera, from, why;

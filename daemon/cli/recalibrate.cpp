@@ -1,10 +1,12 @@
 #include "daemon/cli/recalibrate.h"
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <sstream>
 
+#include "calib/words.h"
 #include "config/camera_file.h"
 #include "config/cell.h"
 #include "config/recalibration_tables.h"
@@ -185,6 +187,20 @@ Knock knock_of_cell(const RecalibrateOptions& options) {
           cell.references.sigma_px};
 }
 
+// A calibrated pose that misses the pixels before by so much is another camera's, or the points are other
+// ones.
+void refuse_strangers(RecalibrationResult& result) {
+  constexpr double strange_px = 50;
+  double sum = 0, count = 0;
+  for (const RecalibrationDeviation& deviation : result.deviations)
+    if (deviation.used) sum += deviation.old_px.squaredNorm(), ++count;
+  if (result.code != Code::ok || sum <= strange_px * strange_px * count) return;
+  result.code = Code::deviation_not_attributable;
+  result.reason =
+      concat({"the calibrated pose misses the pixels before by ", number(std::sqrt(sum / count)),
+              " px (root mean square): is this the camera, and are these its points, in mm of the world?"});
+}
+
 Answer recalibrate_camera(const RecalibrateOptions& options) {
   if (options.cell.empty() == options.camera.empty())
     throw std::invalid_argument(
@@ -201,7 +217,8 @@ Answer recalibrate_camera(const RecalibrateOptions& options) {
   problem.sigma_px = options.sigma_px > 0 ? options.sigma_px : knock.sigma_px;
   problem.points = knock.points;
   if (!options.output.empty()) refuse_existing(options.output, options.replace);
-  const RecalibrationResult result = recalibrate(problem);
+  RecalibrationResult result = recalibrate(problem);
+  refuse_strangers(result);
   if (result.code == Code::ok && !options.output.empty())
     write_moved_camera(options.output, knock.camera, result.X_WCn);
   return {result.code == Code::ok ? done : no_answer, answer_json(problem, result),
