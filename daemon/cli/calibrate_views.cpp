@@ -10,6 +10,7 @@
 #include "calib/views.h"
 #include "config/atomic_file.h"
 #include "config/calibration_tables.h"
+#include "config/camera_file.h"
 #include "config/cameras.h"
 #include "config/csv.h"
 #include "config/files.h"
@@ -17,6 +18,7 @@
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibration_answer.h"
+#include "daemon/cli/output.h"
 #include "daemon/cli/views_report.h"
 
 namespace zeropose {
@@ -50,7 +52,8 @@ struct ViewsOptions {
   int width_px = 0, height_px = 0;
   std::string model = "division";
   std::optional<std::string> start, fix, report, poses;
-  bool one_focal = false;
+  std::string output;
+  bool one_focal = false, replace = false;
   double sigma_px = 0, reject_px = 0, robust = 0;
   bool json = false;
 };
@@ -120,11 +123,24 @@ Json pose_sigma_json(const Matrix6& covariance) {
   return json_of(sigma);
 }
 
-Json cameras_json(const CalibrationViews& input, const ViewsResult& result) {
+std::vector<CalibratedCamera> calibrated(const CalibrationViews& input, const ViewsResult& result) {
   std::vector<CalibratedCamera> cameras;
   for (std::size_t c = 0; c < result.cameras.size(); ++c)
     cameras.push_back({input.cameras[c], result.cameras[c].model, result.cameras[c].X_WC});
-  return Json::parse(cameras_text(cameras));
+  return cameras;
+}
+
+Json cameras_json(const CalibrationViews& input, const ViewsResult& result) {
+  return Json::parse(cameras_text(calibrated(input, result)));
+}
+
+// A camera alone has a pose only where those of the board are known.
+void write_cameras(const std::string& file, const CalibrationViews& input, const ViewsResult& result,
+                   bool known_poses) {
+  std::vector<CalibratedCamera> cameras = calibrated(input, result);
+  if (cameras.size() == 1) cameras.front().name.clear();
+  replace_file(file,
+               cameras.size() > 1 ? cameras_text(cameras) : camera_file_text({cameras.front(), known_poses}));
 }
 
 // One camera: its values; a rig: by camera name.
@@ -259,7 +275,10 @@ Answer calibrate_views_of(const ViewsOptions& options) {
       std::cerr << "step " << iteration << ": rms "
                 << std::sqrt(2 * cost / static_cast<double>(input.points.size())) << " px\n";
     };
+  if (!options.output.empty()) refuse_existing(options.output, options.replace);
   const ViewsResult result = calibrate_views(problem);
+  if (!options.output.empty() && result.status == CalibrationStatus::ok)
+    write_cameras(options.output, input, result, options.poses.has_value());
   if (options.report && result.status == CalibrationStatus::ok)
     write_pages(*options.report, options.points, input, problem, result);
   const char* pose = pose_name(input, options.poses.has_value());
@@ -288,6 +307,9 @@ void add_options(cli::Verb verb, ViewsOptions& options) {
   verb.add_option("--robust", options.robust,
                   "Cauchy's loss: deviations of many times this, px, count little")
       .range(0.0, 1e6);
+  verb.add_option("--output", options.output,
+                  "camera JSON to write: internals, and X_WC with --poses; of a rig all cameras by name");
+  verb.add_flag("--replace", options.replace, "overwrite --output; the old file is kept as .previous");
   verb.add_option("--report", options.report,
                   "the report as a page (SVG) to write; of a rig one per camera, PAGE-camera.svg");
   verb.add_flag("--json", options.json,

@@ -254,6 +254,21 @@ class Views(Case):
         for name in ("rig-left.svg", "rig-right.svg"):
             xml.dom.minidom.parse(str(self.path(name)))
 
+    def test_the_cameras_are_written(self):
+        one = ["calibrate", "views", "--points", self.table({"left": (CAMERA, [0] * 6)}), "--width", 768, "--height", 572,
+               "--output", self.path("camera.json")]
+        self.assertEqual(run(*one)[0], 0)
+        camera = json.loads(self.path("camera.json").read_text())
+        self.assertAlmostEqual(camera["fx"], CAMERA["fx"], delta=1e-4)
+        self.assertNotIn("X_WC", camera)  # nobody knows where it stands
+        self.expect_refused(run(*one), "camera.json: the file exists")
+        two = {"left": (CAMERA, [0] * 6), "right": (CAMERA, [60, 5, -10, 2, -4, 1])}
+        status, _, err = run("calibrate", "views", "--points", self.table(two), "--width", 768, "--height", 572,
+                             "--output", self.path("camera.json"), "--replace")
+        self.assertEqual(status, 0, err)
+        rig = json.loads(self.path("camera.json").read_text())
+        self.assertAlmostEqual(rig["right"]["X_WC"][0], 60, delta=1e-3)
+
     def test_no_answer(self):
         path = self.table({"left": (CAMERA, [0] * 6)})
         lines = path.read_text().splitlines()
