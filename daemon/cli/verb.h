@@ -13,8 +13,8 @@ class Option;
 
 namespace zeropose::cli {
 
-// What an option may be. Handles like this one are copied freely; what is behind them lives as long as the
-// program.
+// What an option may be. Handles like this one are copied freely; what is behind them lives as long as
+// the command line.
 class VerbOption {
  public:
   explicit VerbOption(CLI::Option& option) : option_(&option) {}

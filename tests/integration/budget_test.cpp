@@ -66,12 +66,9 @@ class BudgetCell {
  private:
   const Job& job() const { return true_.jobs.front(); }
 
-  struct Seen {
-    std::vector<std::vector<Observation>> frames;  // of one walk of the hand, where there is one
-  };
-
-  Seen look(const Budget& budget, HandErrors& hand, const Pose& X_WO, bool warm, int frames,
-            Random& random) const {
+  // Pictures of one walk of the hand, where there is one.
+  std::vector<std::vector<Observation>> look(const Budget& budget, HandErrors& hand, const Pose& X_WO,
+                                             bool warm, int frames, Random& random) const {
     std::vector<Pose> X_RH;
     for (std::size_t i = 0; i < job().positions.size(); ++i)
       X_RH.push_back(hand.true_hand(i, job().positions[i].X_RH));
@@ -82,9 +79,9 @@ class BudgetCell {
         camera.X_WC.translation() *= 1 + steel_per_k * budget.cameras_warmer_k;
       for (Mark& mark : object.marks) mark.p_O_mm *= 1 + steel_per_k * budget.object_warmer_k;
     }
-    Seen seen;
+    std::vector<std::vector<Observation>> seen;
     for (int i = 0; i < frames; ++i)
-      seen.frames.push_back(test::observe(cameras, object, X_WO, budget.mark_px, random));
+      seen.push_back(test::observe(cameras, object, X_WO, budget.mark_px, random));
     return seen;
   }
 
@@ -97,8 +94,7 @@ class BudgetCell {
         wrong_calibration(true_.calibration, budget.calibration, static_cast<std::uint64_t>(seed));
     const std::vector<CalibratedCamera> cameras = cameras_for(believed, job());
     const Pose X_WO0_true = job().X_WO_nominal;
-    const ZeroResult zero =
-        make_zero(cameras, job(), look(budget, hand, X_WO0_true, false, 10, random).frames);
+    const ZeroResult zero = make_zero(cameras, job(), look(budget, hand, X_WO0_true, false, 10, random));
     EXPECT_EQ(zero.code, Code::ok) << zero.reason;
     const Job now = compensated(job(), zero.zero);
     const Pose X_WR_true = true_.robots.front().X_WR *
@@ -106,8 +102,8 @@ class BudgetCell {
     double squares = 0;
     for (int car = 0; car < cars; ++car) {
       const Pose X_O0O = test::random_shift(random, shift_mm_, shift_deg_);
-      const Seen seen = look(budget, hand, X_WO0_true * X_O0O, true, 1, random);
-      PoseProblem problem = test::problem_of(cameras, now, seen.frames.front(), zero.zero.X_WO0);
+      const auto seen = look(budget, hand, X_WO0_true * X_O0O, true, 1, random);
+      PoseProblem problem = test::problem_of(cameras, now, seen.front(), zero.zero.X_WO0);
       problem.reject_wrong_marks = false;
       const PoseResult pose = estimate_pose(problem);
       EXPECT_EQ(pose.code, Code::ok) << pose.reason;
@@ -164,60 +160,58 @@ std::map<std::string, BudgetCell::Figures> table(const BudgetCell& cell, std::sp
 }
 
 constexpr CalibrationErrors practice;
+constexpr RobotErrors robot_repeats{0.05, 0.003, 0, 0}, robot_off{0, 0, 0.5, 0.02}, usual_robot;
 
-TEST(ErrorBudget, OfTheCarBodyIsThatOfWarmthAndRobot) {
-  Budget marks{"marks 0.02 px"}, dirty{"marks 0.1 px"}, positions{"camera positions 0.5 mm"},
-      rotations{"camera rotations 0.02 degrees"}, focal{"focal lengths 0.05 %"},
-      origins{"image origins 4.5 px"}, calibration{"calibration, all of it"},
-      repeats{"the guided robot repeats to 0.05 mm, 0.003 degrees"},
-      absolute{"its base 0.5 mm, 0.02 degrees off in the world"},
-      frame{"the cameras' frame 5 K warmer than at the zero"}, body{"the body 5 K warmer"},
-      both{"both 5 K warmer"}, all{"all of that, both 5 K warmer"};
-  marks.mark_px = 0.02;
-  dirty.mark_px = 0.1;
-  positions.calibration = {0.5, 0, 0, 0};
-  rotations.calibration = {0, 0.02, 0, 0};
-  focal.calibration = {0, 0, 0.0005, 0};
-  origins.calibration = {0, 0, 0, 4.5};
-  calibration.calibration = practice;
-  repeats.guided = {0.05, 0.003, 0, 0};
-  absolute.guided = {0, 0, 0.5, 0.02};
-  frame.cameras_warmer_k = body.object_warmer_k = 5;
-  both.cameras_warmer_k = both.object_warmer_k = 5;
-  all = {all.name, 0.1, practice, perfect, {0.05, 0.003, 0.5, 0.02}, 5, 5};
-  const std::array budgets{marks,   dirty,    positions, rotations, focal, origins, calibration,
-                           repeats, absolute, frame,     body,      both,  all};
+TEST(ErrorBudget, OfTheCarBodyIsThatOfRobotAndWarmth) {
+  const std::array budgets{
+      Budget{.name = "marks 0.02 px", .mark_px = 0.02},
+      Budget{.name = "marks 0.1 px", .mark_px = 0.1},
+      Budget{.name = "camera positions 0.5 mm", .calibration = {0.5, 0, 0, 0}},
+      Budget{.name = "camera rotations 0.02 degrees", .calibration = {0, 0.02, 0, 0}},
+      Budget{.name = "focal lengths 0.05 %", .calibration = {0, 0, 0.0005, 0}},
+      Budget{.name = "image origins 4.5 px", .calibration = {0, 0, 0, 4.5}},
+      Budget{.name = "calibration, all of it", .calibration = practice},
+      Budget{.name = "the guided robot repeats to 0.05 mm, 0.003 degrees", .guided = robot_repeats},
+      Budget{.name = "its base 0.5 mm, 0.02 degrees off in the world", .guided = robot_off},
+      Budget{.name = "the cameras' frame 5 K warmer than at the zero", .cameras_warmer_k = 5},
+      Budget{.name = "the body 5 K warmer", .object_warmer_k = 5},
+      Budget{.name = "both 5 K warmer", .cameras_warmer_k = 5, .object_warmer_k = 5},
+      Budget{.name = "all of that, both 5 K warmer",
+             .mark_px = 0.1,
+             .calibration = practice,
+             .guided = usual_robot,
+             .cameras_warmer_k = 5,
+             .object_warmer_k = 5}};
   auto rows = table(BudgetCell("car-body", 30, 0.2), budgets);
+  const auto& calibration = rows["calibration, all of it"];
   // The figures to reach, with marks of 0.1 px and the calibration.
   const Vector6 reached =
-      (rows[dirty.name].rms.array().square() + rows[calibration.name].rms.array().square()).sqrt();
+      (rows["marks 0.1 px"].rms.array().square() + calibration.rms.array().square()).sqrt();
   const Vector6 wanted = (Vector6() << 0.06, 0.08, 0.08, 0.004, 0.004, 0.004).finished();
   EXPECT_TRUE((reached.array() <= wanted.array()).all()) << reached.transpose();
-  EXPECT_GT(rows[body.name].point_mm, rows[calibration.name].point_mm);
+  EXPECT_GT(rows["the body 5 K warmer"].point_mm, calibration.point_mm);
 }
 
 TEST(ErrorBudget, OfTheCameraOnAHandIsWhatTheRobotDoesNotRepeat) {
-  Budget marks{"marks 0.02 px"}, positions{"camera in the hand 0.5 mm"},
-      rotations{"camera in the hand 0.02 degrees"}, focal{"focal length 0.05 %"},
-      origins{"image origin 4.5 px"}, calibration{"calibration, all of it"},
-      repeats{"the hand repeats to 0.05 mm, 0.003 degrees"},
-      absolute{"the hand is 0.5 mm, 0.02 degrees off at each position"},
-      body{"the body 5 K warmer than at the zero"}, all{"all of that"};
-  marks.mark_px = 0.02;
-  positions.calibration = {0.5, 0, 0, 0};
-  rotations.calibration = {0, 0.02, 0, 0};
-  focal.calibration = {0, 0, 0.0005, 0};
-  origins.calibration = {0, 0, 0, 4.5};
-  calibration.calibration = practice;
-  repeats.hand = {0.05, 0.003, 0, 0};
-  absolute.hand = {0, 0, 0.5, 0.02};
-  body.object_warmer_k = 5;
-  all = {all.name, 0.02, practice, {0.05, 0.003, 0.5, 0.02}, perfect, 0, 5};
-  const std::array budgets{marks,       positions, rotations, focal, origins,
-                           calibration, repeats,   absolute,  body,  all};
+  const std::array budgets{
+      Budget{.name = "marks 0.02 px", .mark_px = 0.02},
+      Budget{.name = "camera in the hand 0.5 mm", .calibration = {0.5, 0, 0, 0}},
+      Budget{.name = "camera in the hand 0.02 degrees", .calibration = {0, 0.02, 0, 0}},
+      Budget{.name = "focal length 0.05 %", .calibration = {0, 0, 0.0005, 0}},
+      Budget{.name = "image origin 4.5 px", .calibration = {0, 0, 0, 4.5}},
+      Budget{.name = "calibration, all of it", .calibration = practice},
+      Budget{.name = "the hand repeats to 0.05 mm, 0.003 degrees", .hand = robot_repeats},
+      Budget{.name = "the hand is 0.5 mm, 0.02 degrees off at each position", .hand = robot_off},
+      Budget{.name = "the body 5 K warmer than at the zero", .object_warmer_k = 5},
+      Budget{.name = "all of that",
+             .mark_px = 0.02,
+             .calibration = practice,
+             .hand = usual_robot,
+             .object_warmer_k = 5}};
   auto rows = table(BudgetCell("hand-camera", 15, 0.4), budgets);
-  EXPECT_GT(rows[repeats.name].point_mm, 2 * rows[absolute.name].point_mm);
-  EXPECT_GT(rows[repeats.name].point_mm, 2 * rows[marks.name].point_mm);
+  const double repeats_mm = rows["the hand repeats to 0.05 mm, 0.003 degrees"].point_mm;
+  EXPECT_GT(repeats_mm, 2 * rows["the hand is 0.5 mm, 0.02 degrees off at each position"].point_mm);
+  EXPECT_GT(repeats_mm, 2 * rows["marks 0.02 px"].point_mm);
 }
 
 }  // namespace
