@@ -9,17 +9,14 @@
 
 #include "daemon/cycle.h"
 #include "daemon/overlay.h"
+#include "daemon/pose_json.h"
+#include "daemon/proposal_json.h"
 #include "daemon/survey_json.h"
 
 namespace zeropose {
 namespace {
 
 using Json = nlohmann::json;
-
-Json six(const Pose& X_AB) {
-  const SixNumbers s = to_six_numbers(X_AB);
-  return {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg};
-}
 
 double milliseconds(std::chrono::nanoseconds time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -43,7 +40,7 @@ Json zero_json(const ZeroRecord& record) {
     compensation.push_back({shift.x(), shift.y(), shift.z()});
   return {{"id", record.id},
           {"time", record.time_utc},
-          {"X_WO0", six(record.zero.X_WO0)},
+          {"X_WO0", six_json(record.zero.X_WO0)},
           {"compensation_mm", compensation}};
 }
 
@@ -100,6 +97,7 @@ Json status_answer(Cycle& cycle) {
               {"cameras", cameras},
               {"cycles", status.cycles},
               {"zero_state", verdict(status.zero_code, status.zero_reason)}};
+  answer["proposal"] = proposal_json(status.proposal, cycle.cell());
   if (status.zero) answer["zero"] = zero_json(*status.zero);
   return answer;
 }
@@ -161,13 +159,14 @@ Json measure_answer(Cycle& cycle) {
   if (outcome.device_spread) answer["device_spread_us"] = microseconds(*outcome.device_spread);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
   answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
+  answer["proposal"] = proposal_json(outcome.proposal, cycle.cell());
   answer["cameras"] = Json::array();
   for (std::size_t i = 0; i < outcome.health.size(); ++i)
     answer["cameras"].push_back(
         {{"name", outcome.frames[i].camera}, {"health", health_json(outcome.health[i])}});
   if (m.code != Code::ok) return answer;
-  answer["X_O0O"] = six(m.X_O0O);
-  answer["X_WO"] = six(m.pose.X_WO);
+  answer["X_O0O"] = six_json(m.X_O0O);
+  answer["X_WO"] = six_json(m.pose.X_WO);
   answer["effective_marks"] = m.pose.effective_marks;
   answer["effective_cameras"] = m.pose.effective_cameras;
   answer["largest_deviation_mm"] = m.largest_deviation_mm;

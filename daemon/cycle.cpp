@@ -26,6 +26,14 @@ void log_change(const CameraStatus& camera) {
     spdlog::warn("{} is missing: {}", camera.name, camera.last_problem);
 }
 
+void log_proposal(const CalibratedCamera& camera, const CameraProposal& proposal) {
+  if (!proposal.X_CoCn)
+    return spdlog::warn("{}: where it is now is not known: {}", camera.name, proposal.result.reason);
+  spdlog::warn("{}: by {} reference points it turned by {:.4f} deg and went {:.3f} mm", camera.name,
+               proposal.points.size(), degrees_per_radian * log_so3(proposal.X_CoCn->linear()).norm(),
+               proposal.X_CoCn->translation().norm());
+}
+
 long microseconds(std::chrono::nanoseconds time) {
   return std::chrono::duration_cast<std::chrono::microseconds>(time).count();
 }
@@ -116,6 +124,7 @@ void Cycle::refresh() {
   cell.calibration_hash = cell_.calibration_hash;
   cell.zero_id = now.zero ? now.zero->id : 0;
   now.ready = cell.cameras_alive && cell.zero_valid;
+  if (cell.camera_moved) now.proposal = proposal_;
   for (RobotLink* link : links_) link->set_cell_state(cell);
 
   const std::lock_guard lock(mutex_);
@@ -127,6 +136,8 @@ void Cycle::refresh() {
 
 void Cycle::forget_checks() {
   trend_ = {};
+  moved_.reset();
+  proposal_ = {};
   checks_.assign(cell_.cameras.size(), {});
   health_.assign(cell_.cameras.size(), {});
 }
@@ -147,6 +158,16 @@ void Cycle::remember(const ReferenceCheck& check) {
                   camera.expected);
     known = camera;
   }
+}
+
+void Cycle::propose_places() {
+  if (!moved_) return;
+  const auto& [job, eyes, frames, cameras, measurement] = *moved_;
+  const auto images = images_of(eyes, frames);
+  proposal_ = propose({images, *job, cameras, zeros_[selected_].record->zero, X_O0O_last_, &cell_.references},
+                      measurement);
+  for (const CameraProposal& camera : proposal_.cameras) log_proposal(cameras[camera.camera], camera);
+  moved_.reset();
 }
 
 Status Cycle::status() const {
@@ -174,6 +195,7 @@ void Cycle::carry_out(const Request& request) {
   report.ticket = request.ticket;
   refresh();  // a new zero or job is known to the robot before the answer is
   links_.at(request.robot)->publish(report);
+  propose_places();
   const std::lock_guard lock(mutex_);
   ++status_.cycles;
 }
@@ -277,6 +299,7 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
   const auto cameras = cameras_for(cell_, job, hands_.hands(job));
   m = zeropose::measure({images, job, cameras, zero->zero, X_O0O_last_, references, &trend_});
   remember(m.references);
+  if (m.code == Code::camera_moved) moved_ = {&job, grabbed.eyes, outcome.frames, cameras, m};
   follow_health(health_, images, m, job, cell_);
   for (const std::size_t eye : grabbed.eyes)
     outcome.health.push_back(health_[device_of(job, eye, cell_.cameras.size())]);
@@ -285,7 +308,12 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
 }
 
 MeasureOutcome Cycle::measure_now() {
-  return run_between<MeasureOutcome>([this] { return measure({}, Clock::now() + cell_.deadline, [] {}); });
+  return run_between<MeasureOutcome>([this] {
+    MeasureOutcome outcome = measure({}, Clock::now() + cell_.deadline, [] {});
+    propose_places();
+    if (outcome.measurement.code == Code::camera_moved) outcome.proposal = proposal_;
+    return outcome;
+  });
 }
 
 ZeroOutcome Cycle::zero_now() {

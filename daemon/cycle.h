@@ -20,6 +20,7 @@
 #include "daemon/pictures.h"
 #include "daemon/survey.h"
 #include "measure/measurement.h"
+#include "measure/proposal.h"
 #include "protocol/robot_link.h"
 
 namespace zeropose {
@@ -33,6 +34,7 @@ struct MeasureOutcome {
   std::chrono::nanoseconds grab{}, compute{};
   std::chrono::nanoseconds trigger_spread{};              // of the frames, as in FrameSet
   std::optional<std::chrono::nanoseconds> device_spread;  // likewise
+  Proposal proposal;                                      // of measure_now() where a camera was moved
 };
 
 struct ZeroOutcome {
@@ -72,6 +74,7 @@ struct Status {
   std::optional<ZeroRecord> zero;
   std::vector<CameraStatus> cameras;
   bool cameras_known = false;  // every camera was tried at least once
+  Proposal proposal;           // of the last measurement that found a camera moved
   std::uint64_t cycles = 0;    // requests of robots carried out
 };
 
@@ -113,6 +116,14 @@ class Cycle {
 
  private:
   using Task = std::function<void()>;
+  // A measurement that found a camera moved, and what it was made from.
+  struct Moved {
+    const Job* job = nullptr;
+    std::vector<std::size_t> eyes;
+    std::vector<Frame> frames;
+    std::vector<CalibratedCamera> cameras;
+    Measurement measurement;
+  };
   // What became of a position that a robot told.
   struct Told {
     Code code = Code::internal;
@@ -141,6 +152,9 @@ class Cycle {
   Snapshot snapshot(std::size_t camera);
   void remember(const ReferenceCheck& check);
   bool a_camera_moved() const;
+  // Where the cameras are that the last measurement found moved; takes its time, so the robot is answered
+  // before.
+  void propose_places();
   void forget_checks();  // with a new zero or another job
   void load_zeros();
 
@@ -158,6 +172,8 @@ class Cycle {
   ReferenceTrend trend_;              // since the zero of the selected job
   std::vector<CameraCheck> checks_;   // by camera, when its references were last looked at
   std::vector<CameraHealth> health_;  // by camera
+  std::optional<Moved> moved_;        // until something is proposed
+  Proposal proposal_;                 // since the zero of the selected job
   HandPictures hands_;                // of the selected job
   SurveyState survey_;
 

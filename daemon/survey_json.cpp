@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "daemon/pose_json.h"
+
 namespace zeropose {
 namespace {
 
@@ -72,12 +74,10 @@ Json survey_json(const SurveyState& state) {
   json["positions"] = state.survey->options().positions;
   json["missing"] = state.survey->missing();
   for (const auto& [position, view] : state.survey->views()) {
-    const SixNumbers s = to_six_numbers(view.X_RH);
     Json points = Json::array();
     for (const SurveyPoint& point : view.points) points.push_back(point_json(point));
-    json["views"].push_back({{"position", position},
-                             {"X_RH", {s.x_mm, s.y_mm, s.z_mm, s.rx_deg, s.ry_deg, s.rz_deg}},
-                             {"points", std::move(points)}});
+    json["views"].push_back(
+        {{"position", position}, {"X_RH", six_json(view.X_RH)}, {"points", std::move(points)}});
   }
   return json;
 }

@@ -334,6 +334,18 @@ RecalibrationResult by_groups(const RecalibrationProblem& problem) {
 
 }  // namespace
 
+std::string_view name_of(RecalibrationMethod method) {
+  switch (method) {
+    case RecalibrationMethod::known_points:
+      return "known";
+    case RecalibrationMethod::arbitrary_points:
+      return "arbitrary";
+    case RecalibrationMethod::groups:
+      return "groups";
+  }
+  return "unknown";
+}
+
 RecalibrationResult recalibrate(const RecalibrationProblem& problem) {
   if (auto fault = fault_of(problem)) return *fault;
   switch (problem.method) {

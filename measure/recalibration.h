@@ -3,6 +3,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "calib/camera_model.h"
@@ -15,6 +16,7 @@ enum class RecalibrationMethod {
   arbitrary_points,  // no coordinates: the rotation alone, as if the camera had only turned about its centre
   groups  // coordinates inside each group (a plate): the whole change from the pixels before and after
 };
+std::string_view name_of(RecalibrationMethod method);  // known, arbitrary, groups
 
 // A fixed point. Pixels before (old) and after (new) the camera was moved.
 struct RecalibrationPoint {

@@ -3,6 +3,7 @@
 #include <openssl/evp.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iomanip>
 #include <iostream>
@@ -87,6 +88,48 @@ std::string health_text(const Json& camera) {
          change_text(health, "noise_trend", "noise");
 }
 
+double length_of(const Json& six, std::size_t first) {
+  return std::hypot(six[first].get<double>(), six[first + 1].get<double>(), six[first + 2].get<double>());
+}
+
+// A translation that the points do not tell has none.
+std::string sigma_text(const Json& sigma) {
+  return sigma[0].is_null() ? "of the turn alone, the shift is not known" : pose_text(sigma);
+}
+
+std::string effect_text(const Json& effect) {
+  if (effect.is_null()) return "unknown";
+  return effect["X_O0O"].is_null()
+             ? "code " + effect["code"].dump() + " " + text_or(effect, "name")
+             : pose_text(effect["X_O0O"]) + "  by " + effect["effective_marks"].dump() + " marks";
+}
+
+// Where moved cameras are by their reference points, and what that changes.
+void print_proposal(const Json& answer) {
+  const Json proposal = answer.value("proposal", Json());
+  if (proposal.is_null()) return;
+  for (const auto& camera : proposal["cameras"]) {
+    std::cout << "  " << text_or(camera, "camera") << " by its reference points ("
+              << text_or(camera, "method") << "): ";
+    if (camera["X_CoCn"].is_null()) {
+      std::cout << "no answer: " << text_or(camera, "reason") << '\n';
+      continue;
+    }
+    std::cout << "turned by about " << short_text(length_of(camera["X_CoCn"], 3)) << " deg, shifted by "
+              << short_text(length_of(camera["X_CoCn"], 0)) << " mm, " << short_text(camera["rms_px"])
+              << " px left\n    X_WC was " << pose_text(camera["X_WC_before"]) << "\n    X_WC is  "
+              << pose_text(camera["X_WC"]) << "\n    sigma    " << sigma_text(camera["sigma"]) << '\n';
+    for (const auto& warning : camera["warnings"])
+      std::cout << "    warning: " << warning.get<std::string>() << '\n';
+  }
+  std::cout
+      << "  this picture's x y z mm, rx ry rz deg\n    as calibrated: "
+      << effect_text(proposal["effect"]["believed"])
+      << "\n    as proposed:   " << effect_text(proposal["effect"]["proposed"])
+      << "\n  accept it: zeropose measure --json > measured.json; zeropose recalibrate --cell ... --name ... "
+         "--measured measured.json --output new.json; zeropose calibration activate\n";
+}
+
 void print_status(const Json& answer) {
   std::cout << "cell " << text_or(answer, "cell") << (answer["simulated"] ? " (simulated)" : "") << ", job "
             << text_or(answer, "job") << ": " << (answer["ready"] ? "ready" : "NOT READY") << '\n';
@@ -94,6 +137,7 @@ void print_status(const Json& answer) {
     std::cout << "  " << text_or(camera, "name") << ": "
               << (camera["alive"] ? "there" : "MISSING: " + text_or(camera, "last_problem"))
               << stand_text(camera) << health_text(camera) << '\n';
+  print_proposal(answer);
   if (answer.contains("zero"))
     std::cout << "  zero: " << text_or(answer["zero"], "time") << '\n';
   else
@@ -103,6 +147,7 @@ void print_status(const Json& answer) {
 
 void print_measurement(const Json& answer) {
   print_verdict(answer);
+  print_proposal(answer);
   if (answer.contains("X_O0O"))
     std::cout << "  x y z mm, rx ry rz deg: " << pose_text(answer["X_O0O"]) << "\n  "
               << answer["effective_marks"] << " marks in " << answer["effective_cameras"]

@@ -13,7 +13,7 @@
 #include "daemon/cli/answer.h"
 #include "daemon/cli/measured_references.h"
 #include "daemon/cli/output.h"
-#include "measure/recalibration.h"
+#include "measure/proposal.h"
 
 namespace zeropose {
 namespace {
@@ -35,11 +35,12 @@ covariance belong to X_WC, along and about the world's axes (mm, degrees; the co
 --sigma-px is the noise of one pixel coordinate; without it the sigmas come from the residuals.
 With --cell and --measured instead of --camera, --before, --after, --points: camera --name of the cell, its reference
 points, their pixels at the zero measurement and now. measured.json is what `zeropose measure --json` answered; noise is
-the cell's reference_check sigma_px unless --sigma-px says otherwise.
+the cell's reference_check sigma_px unless --sigma-px says otherwise. The daemon has worked out the same already:
+zeropose status says where a moved camera is and what that changes.
 docs/recalibration.md says which points to choose.
 Examples:
   zeropose measure --json > measured.json
-  zeropose recalibrate --method known --cell cell.json --name camera2 --measured measured.json --output camera2.json
+  zeropose recalibrate --cell cell.json --name camera2 --measured measured.json --output camera2.json
   zeropose recalibrate --method known --camera camera.json --before b.csv --after a.csv --points p.csv --json
 Nothing is activated: give --output to zeropose calibration activate and take a new zero measurement.
 Exit status: 0 done, 1 the points cannot give an answer (status and reason say why), 2 wrong usage or
@@ -58,12 +59,14 @@ RecalibrationMethod method_of(const std::string& name) {
 
 // A camera as calibrated, what it saw before and sees now, and the noise where it is known.
 struct Knock {
+  RecalibrationMethod method = RecalibrationMethod::known_points;
   CameraFile camera;
   std::vector<RecalibrationPoint> points;
   double sigma_px = 0;
 };
 
 void require_fitting_options(const RecalibrateOptions& options, const CameraFile& camera) {
+  if (options.method.empty()) throw std::invalid_argument("--method is required with --camera");
   const bool arbitrary = options.method == "arbitrary";
   for (const auto& [value, option] :
        {std::pair(&options.before, "--before"), std::pair(&options.after, "--after")})
@@ -133,6 +136,7 @@ Json answer_json(const RecalibrationProblem& problem, const RecalibrationResult&
                {"code", static_cast<int>(result.code)},
                {"name", text_of(result.code).name}};
   // No number that could be taken for a pose unless it is one.
+  json["method"] = name_of(problem.method);
   json["X_WC"] = good ? Json(six_of(result.X_WCn)) : Json();
   json["X_CoCn"] = good ? Json(six_of(result.X_CoCn)) : Json();
   json["translation_known"] = result.translation_known;
@@ -172,8 +176,8 @@ std::string answer_text(const RecalibrationProblem& problem, const Recalibration
 Knock knock_of_tables(const RecalibrateOptions& options) {
   const CameraFile camera = load_camera(options.camera, options.name);
   require_fitting_options(options, camera);
-  return {camera, load_recalibration_points(method_of(options.method),
-                                            {options.before, options.after, options.points})};
+  const RecalibrationMethod method = method_of(options.method);
+  return {method, camera, load_recalibration_points(method, {options.before, options.after, options.points})};
 }
 
 Knock knock_of_cell(const RecalibrateOptions& options) {
@@ -182,8 +186,12 @@ Knock knock_of_cell(const RecalibrateOptions& options) {
   if (camera == cell.calibration.end())
     throw std::invalid_argument(
         concat({options.cell, ": has no camera \"", options.name, "\"; name one by --name"}));
-  return {{*camera, true},
-          measured_references(cell, method_of(options.method), options.name, options.measured),
+  const auto index = static_cast<std::size_t>(camera - cell.calibration.begin());
+  const RecalibrationMethod method =
+      options.method.empty() ? suited_method(cell.references, index) : method_of(options.method);
+  return {method,
+          {*camera, true},
+          measured_references(cell, method, options.name, options.measured),
           cell.references.sigma_px};
 }
 
@@ -211,7 +219,7 @@ Answer recalibrate_camera(const RecalibrateOptions& options) {
         concat({options.camera, options.cell,
                 ": the camera has X_HC, expected X_WC: one on a hand has no place of its own"}));
   RecalibrationProblem problem;
-  problem.method = method_of(options.method);
+  problem.method = knock.method;
   problem.model = knock.camera.camera.model;
   problem.X_WCo = knock.camera.camera.X_WC;
   problem.sigma_px = options.sigma_px > 0 ? options.sigma_px : knock.sigma_px;
@@ -231,8 +239,9 @@ void add_recalibrate(cli::Verb app, int& exit_status) {
   auto options = std::make_shared<RecalibrateOptions>();
   const Verb verb =
       app.add_subcommand("recalibrate", "Where a camera that was knocked is now, from fixed points");
-  verb.add_option("--method", options->method, "known, arbitrary or groups")
-      .required()
+  verb.add_option(
+          "--method", options->method,
+          "known, arbitrary or groups; with --measured it may be left out: what suits the camera's points")
       .one_of({"known", "arbitrary", "groups"});
   const VerbOption camera =
       verb.add_option("--camera", options->camera, "JSON of the camera as calibrated, with its X_WC");

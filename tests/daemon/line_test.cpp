@@ -134,10 +134,16 @@ TEST_F(Line, MovedCameraIsNamedAndPutBackItCountsAgain) {
   line.fault("camera-moved", {{"camera", "camera2"}, {"pose", {0, 0, 0, 0.05, 0, 0}}});
   expect_code(Code::camera_moved);
   EXPECT_TRUE(line.robot().read().block.has(status_bit::camera_moved));
-  EXPECT_THAT(line.zeropose({"status"}).out, HasSubstr("camera2: there, MOVED by its reference points"));
+  const std::string status = line.zeropose({"status"}).out;
+  EXPECT_THAT(status, HasSubstr("camera2: there, MOVED by its reference points"));
+  EXPECT_THAT(status, HasSubstr("camera2 by its reference points (known): turned by about 0.05"));
+  EXPECT_THAT(status, HasSubstr("as proposed:  "));
   EXPECT_THAT(line.zeropose({"measure"}).out,
               HasSubstr("the reference points of camera2 are displaced by 3."));
   const Json measured = line.ask_daemon({{"cmd", "measure"}});
+  ASSERT_EQ(measured["proposal"]["cameras"].size(), 1u);
+  EXPECT_NEAR(measured["proposal"]["cameras"][0]["X_CoCn"][3].get<double>(), 0.05, 0.01);
+  EXPECT_EQ(measured["proposal"]["effect"]["proposed"]["code"], 0) << measured["proposal"];
   ASSERT_EQ(measured["references"].size(), 12u);
   for (const auto& reference : measured["references"]) {
     const double moved_px =
@@ -151,6 +157,7 @@ TEST_F(Line, MovedCameraIsNamedAndPutBackItCountsAgain) {
   line.fault("clear");
   expect_good_car(random_shift(generator));
   EXPECT_FALSE(line.robot().read().block.has(status_bit::camera_moved));
+  EXPECT_TRUE(line.ask_daemon({{"cmd", "status"}})["proposal"].is_null());
 }
 
 TEST_F(Line, CoveredReferencesAreNamed) {

@@ -22,6 +22,7 @@ class RenderedExample {
   const Job& job() const { return cell_.jobs.front(); }
   const Scene& scene() const { return scene_; }
   const std::vector<CalibratedCamera>& believed() const { return cell_.calibration; }
+  const References& references() const { return cell_.references; }
   Pose zero_pose() const { return job().X_WO_nominal; }
 
   std::vector<CleanPicture> clean(const Pose& X_WO, const Faults& faults = {}) const {
@@ -35,11 +36,15 @@ class RenderedExample {
   ZeroResult zero(std::span<const CalibratedCamera> believed) {
     const auto pictures = clean(zero_pose());
     std::vector<std::vector<Observation>> frames;
+    std::vector<std::vector<MarkFinding>> references;
     for (int i = 0; i < cell_.zero_frames; ++i) {
       Exposed frame = exposed(pictures);
       frames.push_back(observations_of(find_job_marks(frame.images(), job(), believed, zero_pose()), job()));
+      references.push_back(find_references(frame.images(), cell_.references, believed));
     }
-    return make_zero(believed, job(), frames);
+    ZeroResult result = make_zero(believed, job(), frames);
+    result.zero.references = average_references(cell_.references, believed, references).references;
+    return result;
   }
 
   // Of the object at X_O0O from its zero, with the calibration that the cell ships.
