@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <functional>
+#include <memory>
 #include <random>
 #include <thread>
 #include <vector>
 
 #include "measure/code.h"
+#include "sim/can_robot.h"
 #include "sim/robot.h"
 
 namespace zeropose {
@@ -114,9 +117,11 @@ class Log {
                 "truth", "worst error mm, deg", "ms");
   }
 
+  void next_part() { ++parts_; }
+
   void refused(const Pose& truth, const RobotAnswer& answer) {
     const bool good = answer.code != 0 && may_be(truth, static_cast<Code>(answer.code));
-    count(good);
+    bad_ += good ? 0 : 1;
     if (good)
       std::printf("%5d | beyond its limit and refused: code %u\n", parts_, answer.code);
     else
@@ -128,7 +133,7 @@ class Log {
     const Corrected part = compared(truth, received, time);
     done_.push_back(part);
     const bool good = within_figures(part) && may_be(truth, Code::ok);
-    count(good);
+    bad_ += good ? 0 : 1;
     std::printf("%5d |", parts_);
     print(received);
     print(truth);
@@ -140,8 +145,8 @@ class Log {
   int summary() {
     if (!done_.empty()) print_figures();
     const Vector6& most = options_.max_error;
-    std::printf("%d parts, %d not within %g %g %g mm and %g %g %g deg", parts_, bad_, most(0), most(1),
-                most(2), most(3), most(4), most(5));
+    std::printf("%d parts, %d answers not within %g %g %g mm and %g %g %g deg", parts_, bad_, most(0),
+                most(1), most(2), most(3), most(4), most(5));
     if (options_.max_error_at_points_mm > 0)
       std::printf(", %g mm at the application points", options_.max_error_at_points_mm);
     std::printf("%s\n", options_.beyond_every > 0 ? ", or with a wrong verdict" : "");
@@ -149,11 +154,6 @@ class Log {
   }
 
  private:
-  void count(bool good) {
-    ++parts_;
-    bad_ += good ? 0 : 1;
-  }
-
   bool may_be(const Pose& truth, Code code) const {
     const auto expected = expected_codes(numbers_of(truth), job_.requirements.limits, options_.max_error);
     return std::ranges::find(expected, code) != expected.end();
@@ -245,6 +245,42 @@ RobotAnswer zero_from_hand(const Cell& cell, Tour& tour, SimulatedRobot& robot) 
   return answer.ok() ? robot.zero(static_cast<std::uint16_t>(cell.jobs.front().number)) : answer;
 }
 
+// The cell's robots on CAN buses that there are here; they ask for the same parts.
+class CanRobots {
+ public:
+  CanRobots(const Cell& cell, const DriveOptions& options) {
+    for (const RobotOptions& robot : cell.robots) {
+      const auto* can = std::get_if<CanOptions>(&robot.link);
+      if (can == nullptr) continue;
+      SimulatedCanRobotOptions its{*can, robot.convention, options.robot_max_mm, options.robot_max_deg};
+      its.patience = cell.deadline + 500ms;
+      its.first_request_id = static_cast<std::uint16_t>(std::random_device{}() | 1U);
+      try {
+        robots_.push_back({&robot, std::make_unique<SimulatedCanRobot>(its)});
+        std::printf("%s asks as well, on %s\n", robot.name.c_str(), can->interface.c_str());
+      } catch (const std::runtime_error& error) {
+        std::printf("%s does not drive: %s\n", robot.name.c_str(), error.what());
+      }
+    }
+  }
+
+  void measure(const Job& job, std::uint32_t part,
+               const std::function<void(const RobotOptions&, const RobotAnswer&)>& report) {
+    for (const auto& [options, robot] : robots_) {
+      const RobotAnswer answer = robot->measure(static_cast<std::uint8_t>(job.number), part);
+      report(*options, answer);
+      robot->acknowledge();
+    }
+  }
+
+ private:
+  struct Driven {
+    const RobotOptions* options;
+    std::unique_ptr<SimulatedCanRobot> robot;
+  };
+  std::vector<Driven> robots_;
+};
+
 bool is_ready(SimulatedRobot& robot) {
   const ResultBlock block = robot.read().block;
   return block.state == LinkState::ready && block.has(status_bit::ready);
@@ -297,17 +333,23 @@ int drive(const Cell& cell, const Pose& X_WO0, const DrivenCell& driven, const D
   const Job& job = cell.jobs.front();
   Parts parts(options, job);
   Log log(options, job);
+  CanRobots others(cell, options);
   for (int part = 1; !stop && (!options.parts || part <= *options.parts); ++part) {
     const Pose X_O0O = parts.next();
+    const auto report = [&](const RobotOptions& asking, const RobotAnswer& answer) {
+      if (answer.ok() && answer.correction)
+        log.corrected(X_O0O, shift_from(asking, X_WO0, *answer.correction), answer.to_answer);
+      else
+        log.refused(X_O0O, answer);
+    };
+    log.next_part();
     driven.show(X_WO0 * X_O0O);
     RobotAnswer answer = tour.go(static_cast<std::uint32_t>(part));
     if (answer.ok())
       answer = robot.measure(static_cast<std::uint16_t>(job.number), static_cast<std::uint32_t>(part));
-    if (answer.ok() && answer.correction)
-      log.corrected(X_O0O, shift_from(cell.robots.front(), X_WO0, *answer.correction), answer.to_answer);
-    else
-      log.refused(X_O0O, answer);
+    report(cell.robots.front(), answer);
     if (answer.ok()) robot.acknowledge();
+    others.measure(job, static_cast<std::uint32_t>(part), report);
   }
   return log.summary();
 }

@@ -41,11 +41,11 @@ struct DrivenCell {
   std::function<void(std::size_t robot, const Pose& X_RH)> move_hand;  // what a robot carries
 };
 
-// Drives the first robot of the cell, whose object stands at X_WO0 when the zero measurement is taken. Prints
-// a line for each part and a summary. Where the job has positions for a camera on the robot's hand, the robot
-// goes through them for every part, and takes the zero measurement itself before the first. Returns the exit
-// status: 0 when every part got its correction within the figures, and those beyond a limit the code of that
-// limit instead.
+// Drives the first robot of the cell, and after it those on CAN whose bus there is on this machine; the
+// object stands at X_WO0 when the zero measurement is taken. Prints a line for each part and a summary. Where
+// the job has positions for a camera on the robot's hand, the robot goes through them for every part, and
+// takes the zero measurement itself before the first. Returns the exit status: 0 when every robot got its
+// corrections within the figures, and those beyond a limit the code of that limit instead.
 int drive(const Cell& cell, const Pose& X_WO0, const DrivenCell& driven, const DriveOptions& options,
           const std::atomic<bool>& stop);
 

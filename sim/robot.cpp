@@ -62,15 +62,15 @@ std::string refusal_by_age(const ResultBlock& b, const RobotExpectation& e, cons
   return "";
 }
 
-std::string refusal_by_limits(const Pose& correction, const SimulatedRobotOptions& o) {
-  if (!(correction.translation().norm() <= o.max_translation_mm))
+}  // namespace
+
+std::string refusal_by_limits(const Pose& correction, double max_translation_mm, double max_rotation_deg) {
+  if (!(correction.translation().norm() <= max_translation_mm))
     return "beyond the robot's own limit: translation";
-  if (!(log_so3(correction.linear()).norm() * degrees_per_radian <= o.max_rotation_deg))
+  if (!(log_so3(correction.linear()).norm() * degrees_per_radian <= max_rotation_deg))
     return "beyond the robot's own limit: rotation";
   return "";
 }
-
-}  // namespace
 
 CheckedBlock check_result(std::span<const std::uint16_t> registers, const RobotExpectation& expected,
                           const SimulatedRobotOptions& options) {
@@ -83,7 +83,7 @@ CheckedBlock check_result(std::span<const std::uint16_t> registers, const RobotE
   if (!refusal.empty()) return {refusal, {}, block};
   const auto correction = from_wire(options.convention, block.values);
   if (!correction) return {"values are no correction", {}, block};
-  refusal = refusal_by_limits(*correction, options);
+  refusal = refusal_by_limits(*correction, options.max_translation_mm, options.max_rotation_deg);
   if (!refusal.empty()) return {refusal, {}, block};
   return {"", correction, block};
 }

@@ -49,6 +49,9 @@ struct CheckedBlock {
 CheckedBlock check_result(std::span<const std::uint16_t> registers, const RobotExpectation& expected,
                           const SimulatedRobotOptions& options);
 
+// The robot's own limits, of the length and of the angle; empty: within them.
+std::string refusal_by_limits(const Pose& correction, double max_translation_mm, double max_rotation_deg);
+
 struct RobotAnswer {
   std::string refusal = "not asked";  // empty: accepted (Measure: with a correction), or done
   std::optional<Pose> correction;
