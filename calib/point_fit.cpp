@@ -17,8 +17,6 @@ using Eigen::VectorXd;
 
 constexpr int max_rounds = 100;
 constexpr double max_condition = 1e13;
-// Nobody can tell two explanations apart whose likelihoods differ by less.
-const double undecided = 2 * std::log(1000.0);
 
 struct Sums {
   MatrixXd N;
@@ -123,15 +121,22 @@ double sigma_of_fit(const PointFit& fit, const WrongPointOptions& options) {
   return std::max(options.least_sigma_px, std::sqrt(fit.cost / fit.redundancy));
 }
 
-namespace {
-
-// The points agree as well as their noise allows. Without a known noise every fit does; remove_wrong_points()
-// then asks whether it is much better without one of them.
-bool fits(const PointFit& fit, const WrongPointOptions& options) {
+bool fits_its_noise(const PointFit& fit, const WrongPointOptions& options) {
   if (options.sigma_px == 0 || fit.redundancy < 1) return true;
   const double squares = fit.cost / (options.sigma_px * options.sigma_px);
   return chi_square_tail(squares, fit.redundancy) >= options.false_alarm;
 }
+
+bool better_by_chance(const PointFit& all, const PointFit& best, int rows, std::size_t looks,
+                      const WrongPointOptions& options) {
+  const double sigma = sigma_of_fit(best, options);
+  const double gain = (all.cost - best.cost) / (sigma * sigma);
+  const double tail =
+      options.sigma_px > 0 ? chi_square_tail(gain, rows) : fisher_tail(gain / rows, rows, best.redundancy);
+  return tail * static_cast<double>(looks) >= options.false_alarm;
+}
+
+namespace {
 
 struct Without {
   std::size_t point = 0;
@@ -155,17 +160,6 @@ std::vector<Without> fits_without(const PointFit& all, const std::vector<bool>& 
   return fits;
 }
 
-// Whether chance explains that the best fit without a point is so much better: with one look at each of them.
-bool by_chance(const PointFit& all, const Without& best, std::size_t looks,
-               const WrongPointOptions& options) {
-  const double sigma = sigma_of_fit(best.fit, options);
-  const int rows = static_cast<int>(all.at->rows_per_point());
-  const double gain = (all.cost - best.fit.cost) / (sigma * sigma);
-  const double tail = options.sigma_px > 0 ? chi_square_tail(gain, rows)
-                                           : fisher_tail(gain / rows, rows, best.fit.redundancy);
-  return tail * static_cast<double>(looks) >= options.false_alarm;
-}
-
 }  // namespace
 
 WrongPoints remove_wrong_points(PointFit all, std::vector<bool>& used, const WrongPointOptions& options) {
@@ -173,13 +167,15 @@ WrongPoints remove_wrong_points(PointFit all, std::vector<bool>& used, const Wro
   wrong.fit = std::move(all);
   for (;;) {
     wrong.sigma_px = sigma_of_fit(wrong.fit, options);
-    wrong.agree = fits(wrong.fit, options);
+    wrong.agree = fits_its_noise(wrong.fit, options);
     if (wrong.agree && options.sigma_px > 0) return wrong;
     std::vector<Without> without = fits_without(wrong.fit, used, options.least_redundancy);
-    if (without.empty() || by_chance(wrong.fit, without.front(), without.size(), options)) return wrong;
+    const int rows = static_cast<int>(wrong.fit.at->rows_per_point());
+    if (without.empty() || better_by_chance(wrong.fit, without.front().fit, rows, without.size(), options))
+      return wrong;
     const double sigma = sigma_of_fit(without.front().fit, options);
     for (const Without& other : without)
-      if (other.fit.cost - without.front().fit.cost < undecided * sigma * sigma)
+      if (other.fit.cost - without.front().fit.cost < undecided_squares * sigma * sigma)
         wrong.suspects.push_back(other.point);
     if (wrong.suspects.size() > 1) {
       wrong.agree = false;

@@ -67,6 +67,19 @@ struct WrongPoints {
 // (likelihood ratio below 1000) and if what is left still checks itself. Precondition: all.status is ok.
 WrongPoints remove_wrong_points(PointFit all, std::vector<bool>& used, const WrongPointOptions& options);
 
+// The points agree as well as their noise allows. Without a known noise every fit does: ask whether it is
+// much better without one of them.
+bool fits_its_noise(const PointFit& fit, const WrongPointOptions& options);
+
+// Whether chance explains that the best of so many fits, each without so many rows that check themselves, is
+// so much better than that of all.
+bool better_by_chance(const PointFit& all, const PointFit& best, int rows, std::size_t looks,
+                      const WrongPointOptions& options);
+
+// Nobody can tell two explanations apart whose costs, in squares of sigma, differ by less: a likelihood ratio
+// of 1000.
+inline constexpr double undecided_squares = 13.815510557964274;
+
 // Scale of the whitened residuals: given, else from the cost, not below the least; 0 without redundancy.
 double sigma_of_fit(const PointFit& fit, const WrongPointOptions& options);
 

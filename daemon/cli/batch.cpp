@@ -21,6 +21,7 @@
 #include "daemon/cli/find_body.h"
 #include "daemon/cli/frame.h"
 #include "daemon/cli/help.h"
+#include "daemon/cli/network.h"
 #include "daemon/cli/plan.h"
 #include "daemon/cli/recalibrate.h"
 #include "daemon/cli/triangulate.h"
@@ -287,6 +288,7 @@ void add_batch_verbs(cli::Verb app, int& exit_status) {
   add_find_board(app, exit_status);
   add_find_body(app, exit_status);
   add_frame(app, exit_status);
+  add_network(app, exit_status);
   add_plan(app, exit_status);
   add_triangulate(app, exit_status);
   add_verify(app, exit_status);

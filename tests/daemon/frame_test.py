@@ -37,6 +37,19 @@ class Frame(Case):
             self.assertEqual((status, frame["status"]), (1, "failed"))
             self.assertIn(reason, frame["reason"])
 
+    def test_points_without_a_role_are_carried_over(self):
+        output = self.path("w.csv")
+        status, frame, err = run_json("frame", "--points", self.write("p.csv", HEAD + THREE + '"q, 1",,100,1200,310\n'),
+                                      "--output", output)
+        self.assertEqual((status, frame["redundancy"], len(frame["residuals"])), (0, 0, 3), err)
+        self.assertEqual([p["point"] for p in frame["points"]], ["o", "x1", "p1", "q, 1"])
+        self.expect_near(frame["points"][3]["p_W"], (1000, 0, 10), 1e-9)
+        _, text, _ = run("frame", "--points", self.path("p.csv"))
+        self.assertRegex(text, r"in W, mm: +1000\.0000 +-?0\.0000 +10\.0000  q, 1\n$")
+        lines = output.read_text().splitlines()
+        self.assertEqual(lines[0], "point,x_mm,y_mm,z_mm")
+        self.assertTrue(lines[4].startswith('"q, 1",1000,'), lines)
+
     def test_wrong_usage(self):
         self.expect_refused(run("frame", "--points", self.write("w.csv", HEAD + "a,z,1,2,3\n")), '"z"',
                             "origin, x or xy")
