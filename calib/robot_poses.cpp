@@ -78,6 +78,16 @@ HandTurns turns_of(std::span<const Pose> X_RH) {
 
 bool turns_suffice(const HandTurns& turns) { return turns.least >= least_spread; }
 
+std::vector<Pose> ball_grid(const Pose& X_RH_first, const Eigen::Vector3d& step_mm, bool along_hand) {
+  std::vector<Pose> poses;
+  for (int i = 0; i < 27; ++i) {
+    const Eigen::Vector3d way = Eigen::Vector3d(i % 3, i / 3 % 3, i / 9).cwiseProduct(step_mm);
+    Pose& X_RH = poses.emplace_back(X_RH_first);
+    X_RH.translation() += along_hand ? X_RH.linear() * way : way;
+  }
+  return poses;
+}
+
 std::string direction_text(const Vector3d& direction) {
   std::string text;
   for (int k = 0; k < 3; ++k) {

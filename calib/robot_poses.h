@@ -55,6 +55,10 @@ Reading better_reading(std::span<const Pose> X_RH, const Misfit& misfit, double 
 // Warnings about units from the size of the numbers alone.
 std::vector<std::string> doubtful_units(std::span<const Pose> X_RH);
 
+// 3 x 3 x 3 poses of the hand for a ball grid (spec 40 P2): from the first one on in steps along the axes of
+// the robot's base, or of the hand. x runs fastest.
+std::vector<Pose> ball_grid(const Pose& X_RH_first, const Eigen::Vector3d& step_mm, bool along_hand);
+
 // Unit vector as text: (0.00, 0.00, 1.00).
 std::string direction_text(const Eigen::Vector3d& direction);
 

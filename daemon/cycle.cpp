@@ -99,6 +99,7 @@ void Cycle::run() {
 
 // Looks at cameras and zero and tells the links and whoever asks for the status.
 void Cycle::refresh() {
+  end_forgotten_survey();
   const Job& job = cell_.jobs[selected_];
   Status now;
   now.job = job.name;

@@ -54,7 +54,7 @@ struct SurveyState {
   std::optional<Survey> survey;        // none runs
   std::string last_problem;            // of the last position that was told; empty: it was taken
   TimePoint asked{};                   // when it was last asked for
-  std::optional<std::size_t> robot{};  // that told the first position; others are none of it
+  std::optional<std::size_t> robot{};  // that goes through it; others are none of it
 };
 
 struct CameraStatus {
@@ -143,6 +143,9 @@ class Cycle {
   Code at_position(const Request& request);
   Told look_from_hand(const Request& request);
   Told look_for_survey(const Request& request);
+  // Shows the survey's robot where to go after this position; without a survey nobody goes anywhere.
+  void show_target(int after);
+  void end_forgotten_survey();
   FrameSet grab_for(const Request& request, std::size_t camera);
   // part: whose pictures from hands count; none: of whichever was looked at last.
   MeasureOutcome measure(std::optional<std::uint32_t> part, TimePoint deadline,

@@ -15,17 +15,36 @@ constexpr std::uint32_t zero_part = 0;  // as Zero has it: of several rounds
 
 }  // namespace
 
-Code Cycle::at_position(const Request& request) {
-  if (survey_.survey && Clock::now() - survey_.asked > forgotten_after) {
-    spdlog::warn("the survey ends: nobody asked for it for {} s", forgotten_after.count());
-    survey_ = {};
+void Cycle::end_forgotten_survey() {
+  if (!survey_.survey || Clock::now() - survey_.asked <= forgotten_after) return;
+  spdlog::warn("the survey ends: nobody asked for it for {} s", forgotten_after.count());
+  survey_ = {};
+  show_target(0);
+}
+
+void Cycle::show_target(int after) {
+  const auto& survey = survey_.survey;
+  const bool drives = survey && !survey->options().targets.empty();
+  const int next = drives ? survey->next_after(after) : 0;
+  for (std::size_t robot = 0; robot < links_.size(); ++robot) {
+    const bool goes = next > 0 && robot == survey->options().robot;
+    links_[robot]->show_target(
+        goes ? static_cast<std::uint32_t>(next) : 0,
+        goes ? survey->options().targets[static_cast<std::size_t>(next - 1)] : Pose::Identity());
   }
+}
+
+Code Cycle::at_position(const Request& request) {
+  end_forgotten_survey();
   const bool surveys = survey_.survey && survey_.robot.value_or(request.robot) == request.robot;
   const Told told = surveys ? look_for_survey(request) : look_from_hand(request);
   spdlog::info("{} request {}: position {} of part {}: code {} {}{}", cell_.robots.at(request.robot).name,
                request.id, request.argument, request.part, static_cast<int>(told.code),
                text_of(told.code).name, told.reason.empty() ? "" : " (" + told.reason + ")");
-  if (surveys) survey_.last_problem = told.reason;
+  if (surveys) {
+    survey_.last_problem = told.reason;
+    show_target(request.argument);
+  }
   return told.code;
 }
 
@@ -70,7 +89,9 @@ Cycle::Told Cycle::look_for_survey(const Request& request) {
 void Cycle::start_survey(const SurveyOptions& options) {
   run_between<bool>([this, options] {
     hands_.forget();
-    survey_ = {Survey(options), {}, Clock::now(), {}};
+    const bool drives = !options.targets.empty();
+    survey_ = {Survey(options), {}, Clock::now(), drives ? std::optional(options.robot) : std::nullopt};
+    show_target(0);
     return true;
   });
 }
@@ -83,7 +104,11 @@ SurveyState Cycle::survey_now() {
 }
 
 void Cycle::end_survey() {
-  run_between<bool>([this] { return survey_ = {}, true; });
+  run_between<bool>([this] {
+    survey_ = {};
+    show_target(0);
+    return true;
+  });
 }
 
 }  // namespace zeropose

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -75,6 +76,9 @@ Survey::Survey(const SurveyOptions& options) : options_(options) {
   if (options.positions < 1 || options.positions > most_positions)
     throw std::invalid_argument(
         fmt::format("positions: found {}, expected 1 to {}", options.positions, most_positions));
+  if (!options.targets.empty() && std::ssize(options.targets) != options.positions)
+    throw std::invalid_argument(fmt::format("targets: found {}, expected one for each of {} positions",
+                                            options.targets.size(), options.positions));
 }
 
 SurveyVerdict Survey::look(int position, const Pose& X_RH, const ImageView& first, const ImageView& second) {
@@ -98,6 +102,13 @@ std::vector<int> Survey::missing() const {
   for (int position = 1; position <= options_.positions; ++position)
     if (!views_.contains(position)) missing.push_back(position);
   return missing;
+}
+
+int Survey::next_after(int position) const {
+  const std::vector<int> open = missing();
+  if (open.empty()) return 0;
+  const auto next = std::ranges::upper_bound(open, position);
+  return next != open.end() ? *next : open.front();
 }
 
 }  // namespace zeropose

@@ -30,6 +30,9 @@ struct SurveyOptions {
   std::size_t camera = 0;  // of the cell
   std::variant<BallTarget, BoardTarget> target;
   int positions = 0;  // the robot counts them from 1
+  // Where the hand shall go, X_RH of each position; empty: the robot's own program knows.
+  std::vector<Pose> targets{};
+  std::size_t robot = 0;  // of the cell, that goes to the targets
 };
 
 struct SurveyPoint {
@@ -63,6 +66,8 @@ class Survey {
 
   const std::map<int, SurveyView>& views() const { return views_; }
   std::vector<int> missing() const;
+  // The next one to go to after this one was told, and from the end again to the first; 0: none is missing.
+  int next_after(int position) const;
 
  private:
   SurveyOptions options_;

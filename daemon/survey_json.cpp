@@ -1,9 +1,11 @@
 #include "daemon/survey_json.h"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
 
 #include "daemon/pose_json.h"
+#include "protocol/codec.h"
 
 namespace zeropose {
 namespace {
@@ -49,6 +51,28 @@ Json point_json(const SurveyPoint& point) {
           {"svv", S(1, 1)},           {"suv", S(0, 1)}};
 }
 
+std::size_t driven_robot(const Cell& cell, const std::string& name) {
+  const auto found = std::ranges::find(cell.robots, name, &RobotOptions::name);
+  if (found == cell.robots.end()) throw std::invalid_argument("the cell has no robot \"" + name + "\"");
+  if (!std::holds_alternative<ModbusTcpOptions>(found->link) &&
+      !std::holds_alternative<ModbusRtuOptions>(found->link))
+    throw std::invalid_argument("robot " + name +
+                                " cannot be told where to go: only a Modbus server's registers carry it");
+  return static_cast<std::size_t>(found - cell.robots.begin());
+}
+
+std::vector<Pose> targets_of(const RobotOptions& robot, const Json& poses) {
+  std::vector<Pose> targets;
+  for (const Json& pose : poses) {
+    const auto s = pose.get<std::array<double, 6>>();
+    targets.push_back(from_six_numbers({s[0], s[1], s[2], s[3], s[4], s[5]}));
+    if (!to_wire(robot.convention, targets.back()))
+      throw std::invalid_argument("target " + std::to_string(targets.size()) +
+                                  " has numbers that the robot's registers cannot carry");
+  }
+  return targets;
+}
+
 }  // namespace
 
 SurveyOptions survey_options(const Cell& cell, const Json& question) {
@@ -61,6 +85,9 @@ SurveyOptions survey_options(const Cell& cell, const Json& question) {
     options.target = ball_target(target);
   else
     options.target = board_target(kind, target);
+  if (!question.contains("targets")) return options;
+  options.robot = driven_robot(cell, question.at("robot").get<std::string>());
+  options.targets = targets_of(cell.robots[options.robot], question.at("targets"));
   return options;
 }
 

@@ -10,7 +10,9 @@ namespace zeropose {
 
 // {"camera": NAME, "positions": N, "target": {"kind": "ball", "bright", "min_diameter_px", "max_diameter_px"}
 // or
-// {"kind": "circles" | "asymmetric-circles" | "chessboard", "rows", "cols", "pitch_mm"}}. Throws
+// {"kind": "circles" | "asymmetric-circles" | "chessboard", "rows", "cols", "pitch_mm"}}; with "robot": NAME,
+// "targets":
+// [[x, y, z, rx, ry, rz] of X_RH, ...] that robot is told where to go. Throws
 // std::invalid_argument or what JSON throws for a wrong question.
 SurveyOptions survey_options(const Cell& cell, const nlohmann::json& question);
 

@@ -236,4 +236,25 @@ PositionRegisters encode_position(const PositionBlock& position, std::uint16_t d
   return r;
 }
 
+std::optional<TargetBlock> decode_target(std::span<const std::uint16_t> registers, std::uint16_t data_id) {
+  if (registers.size() != target_reg::block_size) return std::nullopt;
+  if (get32(registers, target_reg::crc) != crc32_of_registers(data_id, registers.first(target_reg::crc)))
+    return std::nullopt;
+  TargetBlock target{get32(registers, target_reg::epoch), get32(registers, target_reg::index), {}};
+  for (std::size_t i = 0; i < reg::value_count; ++i)
+    target.values[i] = static_cast<std::int32_t>(get32(registers, target_reg::values + 2 * i));
+  return target;
+}
+
+TargetRegisters encode_target(const TargetBlock& target, std::uint16_t data_id) {
+  TargetRegisters r{};
+  put32(r, target_reg::epoch, target.epoch);
+  put32(r, target_reg::index, target.index);
+  for (std::size_t i = 0; i < reg::value_count; ++i)
+    put32(r, target_reg::values + 2 * i, static_cast<std::uint32_t>(target.values[i]));
+  put32(r, target_reg::crc,
+        crc32_of_registers(data_id, std::span<const std::uint16_t>(r).first(target_reg::crc)));
+  return r;
+}
+
 }  // namespace zeropose

@@ -1,4 +1,4 @@
-// The result, command and position blocks, between values and registers (spec 80). Pure.
+// The result, command, position and target blocks, between values and registers (spec 80). Pure.
 #pragma once
 
 #include <array>
@@ -114,5 +114,19 @@ std::optional<PositionBlock> decode_position(std::span<const std::uint16_t> regi
                                              std::uint16_t data_id = default_command_data_id);
 PositionRegisters encode_position(const PositionBlock& position,
                                   std::uint16_t data_id = default_command_data_id);
+
+// Where the robot's hand shall go next, for calibration: X_RH in its convention. index 0: nowhere.
+struct TargetBlock {
+  std::uint32_t epoch = 0;
+  std::uint32_t index = 0;
+  WireValues values = no_values;
+  friend bool operator==(const TargetBlock&, const TargetBlock&) = default;
+};
+using TargetRegisters = std::array<std::uint16_t, target_reg::block_size>;
+
+// nullopt: not exactly its registers, or the CRC is wrong.
+std::optional<TargetBlock> decode_target(std::span<const std::uint16_t> registers,
+                                         std::uint16_t data_id = default_result_data_id);
+TargetRegisters encode_target(const TargetBlock& target, std::uint16_t data_id = default_result_data_id);
 
 }  // namespace zeropose

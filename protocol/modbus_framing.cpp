@@ -16,6 +16,7 @@ Ruling exception(std::uint8_t number) { return {Ruling::Kind::exception, number}
 Ruling rule_read(std::size_t first, std::size_t count) {
   if (count == 0 || count > 125) return exception(illegal_data_value);
   const std::size_t end = first + count;
+  if (first == target_reg::first && count == target_reg::block_size) return {Ruling::Kind::target, 0};
   if (end > reg::block_size) return exception(illegal_data_address);
   const bool whole = first == 0 && end == reg::block_size;
   const bool touches_values = first < reg::values_end && end > reg::values;

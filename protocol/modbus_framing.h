@@ -72,13 +72,13 @@ class FrameReader {
 
 // What to do with a request.
 struct Ruling {
-  enum class Kind { exception, read, command, position };
+  enum class Kind { exception, read, target, command, position };
   Kind kind = Kind::exception;
   std::uint8_t exception = modbus::illegal_function;
 };
 
-// Reads: of the result block, whole, or a part without its values. Writes: exactly the command block, or
-// exactly the position block.
+// Reads: of the result block, whole, or a part without its values; of the target block, whole. Writes:
+// exactly the command block, or exactly the position block.
 Ruling rule(const Adu& request, bool may_write);
 
 // Precondition: rule() said command or position.

@@ -34,12 +34,16 @@ struct ModbusReply::Library {
   // Input registers 0..60 and the same as holding registers.
   std::unique_ptr<modbus_mapping_t, FreeMapping> result{modbus_mapping_new_start_address(
       0, 0, 0, 0, 0, static_cast<unsigned>(reg::block_size), 0, static_cast<unsigned>(reg::block_size))};
+  // The same of the target block.
+  std::unique_ptr<modbus_mapping_t, FreeMapping> target{modbus_mapping_new_start_address(
+      0, 0, 0, 0, static_cast<unsigned>(target_reg::first), static_cast<unsigned>(target_reg::block_size),
+      static_cast<unsigned>(target_reg::first), static_cast<unsigned>(target_reg::block_size))};
   std::unique_ptr<modbus_mapping_t, FreeMapping> command{modbus_mapping_new_start_address(
       0, 0, 0, 0, static_cast<unsigned>(command_reg::first), writable_registers, 0, 0)};
 };
 
 ModbusReply::ModbusReply() : library_(std::make_unique<Library>()) {
-  if (!library_->context || !library_->result || !library_->command) fail("no memory");
+  if (!library_->context || !library_->result || !library_->target || !library_->command) fail("no memory");
   int ends[2] = {-1, -1};
   if (socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends) != 0) fail("socketpair");
   library_end_ = Descriptor(ends[0]);
@@ -63,6 +67,14 @@ std::vector<std::uint8_t> ModbusReply::registers(const Adu& request, const Resul
   std::ranges::copy(block, library_->result->tab_registers);
   modbus_reply(library_->context.get(), request.bytes.data(), static_cast<int>(request.size),
                library_->result.get());
+  return receive();
+}
+
+std::vector<std::uint8_t> ModbusReply::registers(const Adu& request, const TargetRegisters& block) {
+  std::ranges::copy(block, library_->target->tab_input_registers);
+  std::ranges::copy(block, library_->target->tab_registers);
+  modbus_reply(library_->context.get(), request.bytes.data(), static_cast<int>(request.size),
+               library_->target.get());
   return receive();
 }
 

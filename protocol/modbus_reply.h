@@ -18,6 +18,7 @@ class ModbusReply {
 
   // The whole ADU to send back. Empty: libmodbus had none, close the connection.
   std::vector<std::uint8_t> registers(const Adu& request, const ResultRegisters& block);
+  std::vector<std::uint8_t> registers(const Adu& request, const TargetRegisters& block);
   std::vector<std::uint8_t> written(const Adu& request);
   std::vector<std::uint8_t> exception(const Adu& request, std::uint8_t number);
 

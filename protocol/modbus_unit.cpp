@@ -70,6 +70,9 @@ std::vector<std::uint8_t> ModbusUnitServer::answer(const Adu& request, Connectio
       // One snapshot, with its age and CRC now, for the whole answer.
       ++counters.reads;
       return reply.registers(request, encode(endpoint_->block(), unit_.result_data_id));
+    case Ruling::Kind::target:
+      ++counters.reads;
+      return reply.registers(request, encode_target(endpoint_->target(), unit_.result_data_id));
     case Ruling::Kind::command:
       exception = take_command(request, from, counters);
       break;

@@ -66,6 +66,18 @@ constexpr std::array<RegisterField, 3> position_fields{{
      "over the data id 0x5A51 (not on the wire) and the eighteen registers before"},
 }};
 
+constexpr std::size_t target_at(std::size_t offset) { return target_reg::first + offset; }
+
+constexpr std::array<RegisterField, 4> target_fields{{
+    {target_at(target_reg::epoch), 2, "session epoch", "that of the result block"},
+    {target_at(target_reg::index), 2, "index", "of the position to go to; 0: none"},
+    {target_at(target_reg::values), 2 * reg::value_count, "values",
+     "where the robot's hand shall be in its base (X_RH), in the robot's convention; 0x80000000 where "
+     "unused"},
+    {target_at(target_reg::crc), 2, "CRC-32",
+     "over the data id 0x5A50 (not on the wire) and the twenty registers before"},
+}};
+
 std::string rows(std::span<const RegisterField> fields) {
   std::ostringstream text;
   text << "| register | field | meaning |\n|---|---|---|\n";
@@ -91,11 +103,15 @@ std::span<const RegisterField> command_block_fields() { return command_fields; }
 
 std::span<const RegisterField> position_block_fields() { return position_fields; }
 
+std::span<const RegisterField> target_block_fields() { return target_fields; }
+
 std::string register_map_markdown() {
   return "Result block: input registers (FC04), the same as holding registers (FC03).\n\n" +
          rows(result_block_fields()) + "\nCommand block: holding registers (FC16).\n\n" +
          rows(command_block_fields()) + "\nPosition block: holding registers (FC16).\n\n" +
-         rows(position_block_fields());
+         rows(position_block_fields()) +
+         "\nTarget block: input registers (FC04), the same as holding registers (FC03).\n\n" +
+         rows(target_block_fields());
 }
 
 std::string wire_values_markdown() {

@@ -1,4 +1,4 @@
-// Where each field of the three Modbus blocks stands (spec 80). The codec and the robot programmer's page use
+// Where each field of the four Modbus blocks stands (spec 80). The codec and the robot programmer's page use
 // it.
 #pragma once
 
@@ -31,6 +31,12 @@ inline constexpr std::size_t first = 1100;  // holding register of the block's s
 inline constexpr std::size_t index = 0, values = 2, crc = values + 2 * reg::value_count, block_size = crc + 2;
 }  // namespace position_reg
 
+namespace target_reg {
+inline constexpr std::size_t first = 200;  // input register of the block's start; the others are offsets
+inline constexpr std::size_t epoch = 0, index = 2, values = 4, crc = values + 2 * reg::value_count,
+                             block_size = crc + 2;
+}  // namespace target_reg
+
 inline constexpr std::uint16_t block_magic = 0x5A50;
 inline constexpr std::uint16_t block_map_version = 1;
 inline constexpr std::uint16_t default_result_data_id = 0x5A50;
@@ -50,6 +56,7 @@ struct RegisterField {
 std::span<const RegisterField> result_block_fields();
 std::span<const RegisterField> command_block_fields();
 std::span<const RegisterField> position_block_fields();
+std::span<const RegisterField> target_block_fields();
 
 // The tables of docs/modbus.md, in Markdown.
 std::string register_map_markdown();

@@ -57,6 +57,21 @@ void RobotEndpoint::exposure_done(std::uint32_t request_id) {
   change([&](TimePoint now) { handshake_.on_exposure_done(request_id, now); });
 }
 
+// A pose that the wire cannot carry is none.
+void RobotEndpoint::show_target(std::uint32_t index, const Pose& X_RH) {
+  const auto values = index == 0 ? std::nullopt : to_wire(options_.handshake.convention, X_RH);
+  const std::scoped_lock lock(mutex_);
+  target_ = values ? TargetBlock{0, index, *values} : TargetBlock{};
+}
+
+TargetBlock RobotEndpoint::target() {
+  return locked([&](TimePoint now) {
+    TargetBlock target = target_;
+    target.epoch = handshake_.block(now).epoch;
+    return target;
+  });
+}
+
 void RobotEndpoint::publish(const Report& report) {
   change([&](TimePoint now) { handshake_.on_report(report, now); });
 }

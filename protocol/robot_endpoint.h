@@ -33,6 +33,7 @@ class RobotEndpoint : public RobotLink {
   void set_cell_state(const CellState& state) override;
   void exposure_done(std::uint32_t request_id) override;
   void publish(const Report& report) override;
+  void show_target(std::uint32_t index, const Pose& X_RH) override;
 
   // For the wire. A connection's number is never used again, also not on another wire. 0 and 1 are free for a
   // wire's own events.
@@ -43,6 +44,8 @@ class RobotEndpoint : public RobotLink {
   void disconnected(ConnectionId connection);
   // What the robot gets that reads now, with its age.
   ResultBlock block();
+  // Where its hand shall go, with the epoch of now.
+  TargetBlock target();
   // Publishes the time-out at the deadline and withdraws a result at the end of its validity; the wire calls
   // it at next_event() at the latest.
   void tick();
@@ -66,6 +69,7 @@ class RobotEndpoint : public RobotLink {
   mutable std::mutex mutex_;  // guards what follows
   Handshake handshake_;
   std::optional<std::uint16_t> tapped_sequence_;
+  TargetBlock target_;
   std::mutex wake_mutex_;
   std::function<void()> wake_;
 };

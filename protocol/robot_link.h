@@ -16,6 +16,8 @@ class RobotLink {
   virtual void exposure_done(std::uint32_t request_id) = 0;
   // The answer to the request under way. Too late, or of another id: ignored and counted.
   virtual void publish(const Report& report) = 0;
+  // Where its hand shall go next, X_RH; index 0: nowhere. Only Modbus servers carry it.
+  virtual void show_target(std::uint32_t index, const Pose& X_RH) = 0;
 };
 
 // Called from the link's thread for every accepted command that the cycle has to carry out. Must not block.

@@ -159,10 +159,11 @@ SimulatedRobot::Reply SimulatedRobot::exchange(std::span<const std::uint8_t> pdu
   return reply;
 }
 
-bool SimulatedRobot::read_block(std::vector<std::uint16_t>& registers, RobotAnswer& answer) {
+bool SimulatedRobot::read_registers(std::size_t first, std::size_t count,
+                                    std::vector<std::uint16_t>& registers, RobotAnswer& answer) {
   std::vector<std::uint8_t> pdu{read_input_registers};
-  put16(pdu, 0);
-  put16(pdu, reg::block_size);
+  put16(pdu, first);
+  put16(pdu, count);
   const Reply reply = exchange(pdu);
   answer.exception = reply.exception;
   answer.refusal = reply.failure;
@@ -170,6 +171,11 @@ bool SimulatedRobot::read_block(std::vector<std::uint16_t>& registers, RobotAnsw
   registers.clear();
   for (std::size_t i = 2; i + 1 < reply.pdu.size(); i += 2)
     registers.push_back(static_cast<std::uint16_t>(reply.pdu[i] << 8 | reply.pdu[i + 1]));
+  return true;
+}
+
+bool SimulatedRobot::read_block(std::vector<std::uint16_t>& registers, RobotAnswer& answer) {
+  if (!read_registers(0, reg::block_size, registers, answer)) return false;
   const DecodedBlock decoded = decode_result(registers, options_.result_data_id);
   if (decoded.problem) answer.refusal = name_of(*decoded.problem);
   if (!decoded.problem) answer.block = decoded.block;
@@ -275,6 +281,18 @@ RobotAnswer SimulatedRobot::at_position(std::uint16_t job, std::uint32_t part, s
             encode_position({static_cast<std::uint32_t>(position), *values}, options_.command_data_id));
   if (!told.ok()) return told;
   return command(CommandKind::at_position, job, part, position, options_.zero_patience);
+}
+
+std::optional<HandTarget> SimulatedRobot::target() {
+  RobotAnswer answer;
+  std::vector<std::uint16_t> block, registers;
+  if (!read_block(block, answer) ||
+      !read_registers(target_reg::first, target_reg::block_size, registers, answer))
+    return std::nullopt;
+  const auto target = decode_target(registers, options_.result_data_id);
+  if (!target || target->index == 0 || target->epoch != answer.block.epoch) return std::nullopt;
+  const auto X_RH = from_wire(options_.convention, target->values);
+  return X_RH ? std::optional(HandTarget{target->index, *X_RH}) : std::nullopt;
 }
 
 RobotAnswer SimulatedRobot::select_job(std::uint16_t job) {

@@ -64,6 +64,12 @@ struct RobotAnswer {
   bool ok() const { return refusal.empty(); }
 };
 
+// Where the daemon wants the hand.
+struct HandTarget {
+  std::uint32_t index = 0;  // from 1
+  Pose X_RH = Pose::Identity();
+};
+
 // Connects when needed. Not thread-safe. Nothing here throws for what a cell or a network can do.
 class SimulatedRobot {
  public:
@@ -73,6 +79,8 @@ class SimulatedRobot {
   RobotAnswer zero(std::uint16_t job);
   // Tells where the hand is; position counts from 1.
   RobotAnswer at_position(std::uint16_t job, std::uint32_t part, std::int32_t position, const Pose& X_RH);
+  // Where the daemon wants the hand next, of this session; nullopt: nowhere.
+  std::optional<HandTarget> target();
   RobotAnswer select_job(std::uint16_t job);
   RobotAnswer reset();
   RobotAnswer halt();
@@ -99,6 +107,9 @@ class SimulatedRobot {
              Clock::time_point read_started, RobotAnswer& answer);
   RobotAnswer send(const Command& command);
   RobotAnswer write(std::uint16_t first, std::span<const std::uint16_t> registers);
+  // `count` input registers from `first` on, not looked at.
+  bool read_registers(std::size_t first, std::size_t count, std::vector<std::uint16_t>& registers,
+                      RobotAnswer& answer);
   bool read_block(std::vector<std::uint16_t>& registers, RobotAnswer& answer);
   std::string connect();
   Reply exchange(std::span<const std::uint8_t> pdu);

@@ -1,5 +1,6 @@
 // The robot program of a ball grid (spec 40 P2): a robot carries a ball to 3 x 3 x 3 positions before one
-// camera, says where its hand is, and tells a position again that was not taken.
+// camera, says where its hand is, and tells a position again that was not taken. Where the daemon's survey
+// has targets of its own it goes to those, inside its own space only.
 #pragma once
 
 #include <atomic>
@@ -25,10 +26,8 @@ struct SurveyDrive {
   RobotErrors errors;
 };
 
-inline constexpr int survey_positions = 27;
-Pose survey_position(const SurveyDrive& survey, int position);  // from 0
-
-// Returns the exit status: 0 when every position was taken. Waits for the daemon's survey to begin.
+// Goes where the daemon's survey says, or through its own grid where that says nothing. Returns the exit
+// status: 0 when every position was taken. Waits for the survey to begin.
 int drive_survey(const Cell& cell, const SurveyDrive& survey,
                  const std::function<void(const CarriedBall&)>& show, const std::atomic<bool>& stop);
 

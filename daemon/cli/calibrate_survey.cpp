@@ -5,11 +5,14 @@
 #include <sstream>
 #include <thread>
 
+#include "calib/robot_poses.h"
 #include "config/atomic_file.h"
 #include "config/config_error.h"
+#include "config/robot_tables.h"
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/convert.h"
 #include "daemon/cli/output.h"
 #include "daemon/control.h"
 #include "protocol/line_socket.h"
@@ -32,7 +35,13 @@ is lost: what was gathered when the time is up is written too.
                      a board of --rows --cols --pitch-mm: hand-eye. Then: zeropose calibrate hand-eye. It must look
                      different from every side: asymmetric circles with an odd number of rows
 Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards also x_mm y_mm z_mm).
-Example:
+The robot's own program knows the positions; or, with --drive ROBOT, the daemon tells it where to go, one position
+after the other (target block, docs/modbus.md): --targets file.csv (view x_mm .. rz_deg: X_RH), or a grid of 3 x 3 x 3
+from --first in steps of --step along the base's axes, or with --along-hand the hand's. The robot moves only inside its
+own space, which its program checks; a position that is not taken comes again at the end.
+Examples:
+  zeropose calibrate survey --camera camera1 --drive robot1 --first -60,800,420,0,180,0 --step 60,60,80 --target ball \
+      --min-diameter-px 20 --max-diameter-px 80 --robot robot.csv --points ball.csv
   zeropose calibrate survey --camera camera1 --positions 27 --target ball --min-diameter-px 20 --max-diameter-px 80 \
       --robot robot.csv --points ball.csv
 Exit status: 0 all positions, 1 the time was up before (the files hold what there is), 2 no daemon or wrong usage.)";
@@ -40,6 +49,9 @@ Exit status: 0 all positions, 1 the time was up before (the files hold what ther
 struct Options {
   std::string socket = default_control_socket().string();
   std::string camera, target = "ball", robot, points;
+  std::string drive, targets;
+  std::optional<std::string> first, step;
+  bool along_hand = false;
   int positions = 0, rows = 0, cols = 0;
   double min_diameter_px = 0, max_diameter_px = 0, pitch_mm = 0, patience_s = 600;
   bool bright = false, replace = false, json = false;
@@ -99,14 +111,36 @@ void refuse_contradictions(const Options& options) {
         "an odd number");
 }
 
-Json gathered(const Options& options) {
+// Where the robot is told to go; empty: its own program knows.
+std::vector<Pose> targets_of(const Options& options) {
+  const bool grid = options.first || options.step || options.along_hand;
+  if (options.drive.empty()) {
+    if (grid || !options.targets.empty())
+      throw std::invalid_argument("--targets, --first, --step: expected --drive, the robot that goes there");
+    if (options.positions == 0) throw std::invalid_argument("expected --positions, or --drive with targets");
+    return {};
+  }
+  if (grid == !options.targets.empty() || (grid && !(options.first && options.step)))
+    throw std::invalid_argument("--drive: expected --targets, or --first and --step");
+  std::vector<Pose> targets;
+  if (grid)
+    targets = ball_grid(*pose_of_option(options.first, "--first"), place_of_option(*options.step, "--step"),
+                        options.along_hand);
+  else
+    for (const HandPose& pose : load_hand_poses(options.targets, "view", false)) targets.push_back(pose.X_RH);
+  if (options.positions != 0 && options.positions != static_cast<int>(targets.size()))
+    throw std::invalid_argument(concat({"--positions: found ", std::to_string(options.positions),
+                                        ", there are ", std::to_string(targets.size()), " targets"}));
+  return targets;
+}
+
+Json gathered(const Options& options, std::size_t positions) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(options.patience_s);
   std::size_t told = 0;
   std::string problem;
   for (;;) {
     const Json now = ask_daemon(options, {{"cmd", "survey"}});
-    if (now["positions"] != options.positions)
-      throw ConfigError({"another survey took the place of this one"});
+    if (now["positions"] != positions) throw ConfigError({"another survey took the place of this one"});
     tell_progress(now, told, problem);
     if (now["missing"].empty() || Clock::now() >= deadline) return now;
     std::this_thread::sleep_for(200ms);
@@ -143,12 +177,19 @@ std::string points_table(const Json& views, bool ball) {
 Answer survey(const Options& options) {
   refuse_contradictions(options);
   for (const std::string& path : {options.robot, options.points}) refuse_existing(path, options.replace);
-  ask_daemon(options, {{"cmd", "survey-start"},
-                       {"camera", options.camera},
-                       {"positions", options.positions},
-                       {"target", target_of(options)}});
-  std::cerr << "waiting for the robot to tell " << options.positions << " positions\n";
-  const Json all = gathered(options);
+  const std::vector<Pose> targets = targets_of(options);
+  const std::size_t positions =
+      targets.empty() ? static_cast<std::size_t>(options.positions) : targets.size();
+  Json question{{"cmd", "survey-start"},
+                {"camera", options.camera},
+                {"positions", positions},
+                {"target", target_of(options)}};
+  if (!targets.empty()) question["robot"] = options.drive;
+  for (const Pose& X_RH : targets) question["targets"].push_back(six_of(X_RH));
+  ask_daemon(options, question);
+  std::cerr << (targets.empty() ? "waiting for the robot to tell " : "the robot is told to go to ")
+            << positions << " positions\n";
+  const Json all = gathered(options, positions);
   replace_file(options.robot, robot_table(all["views"]));
   replace_file(options.points, points_table(all["views"], options.target == "ball"));
   ask_daemon(options, {{"cmd", "survey-end"}});
@@ -178,9 +219,15 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
       calibrate.add_subcommand("survey", "Gathers what a camera sees at positions that a robot tells");
   verb.add_option("--socket", options->socket, "the daemon's Unix socket").shows_default();
   verb.add_option("--camera", options->camera, "name of the camera in the cell").required();
-  verb.add_option("--positions", options->positions, "how many positions the robot goes through")
-      .required()
+  verb.add_option("--positions", options->positions,
+                  "how many positions the robot's own program goes through")
       .range(1, 1000);
+  verb.add_option("--drive", options->drive, "name of the robot that is told where to go");
+  verb.add_option("--targets", options->targets,
+                  "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg (X_RH) to go to");
+  verb.add_option("--first", options->first, "x,y,z,rx,ry,rz: the first X_RH of a grid of 3 x 3 x 3");
+  verb.add_option("--step", options->step, "x,y,z: the grid's steps, mm");
+  verb.add_flag("--along-hand", options->along_hand, "the steps run along the axes of the hand");
   verb.add_option("--target", options->target, "what is looked for")
       .shows_default()
       .one_of({"ball", "circles", "asymmetric-circles", "chessboard"});
