@@ -44,9 +44,10 @@ std::string_view name_of(HandEyeStatus status);
 
 struct HandEyeViewResult {
   bool used = false;
-  std::string reason;            // why not
-  Pose X_CB = Pose::Identity();  // from this view alone
-  std::size_t points_used = 0;   // the others contradict them
+  std::string reason;                       // why not
+  Pose X_CB = Pose::Identity();             // from this view alone
+  std::size_t points_used = 0;              // the others contradict them
+  std::vector<std::size_t> points_removed;  // those others
   // Where this view alone puts the board beside where robot and estimate put it; infinite without a pose.
   double error_mm = 0, error_deg = 0;
   double rms_px = 0;  // of the joint estimate

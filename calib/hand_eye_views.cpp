@@ -74,6 +74,7 @@ std::optional<SeenView> look(const HandEyeProblem& problem, std::size_t view,
   seen.cost = equations->cost;
   result.X_CB = seen.X_CB;
   result.points_used = seen.points.size();
+  result.points_removed = alone.removed;
   return seen;
 }
 

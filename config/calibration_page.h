@@ -18,6 +18,7 @@ struct CalibrationReport {
   double frame_offset_z_mm = 0;
   std::optional<CalibratedCamera> active;  // the calibration in use, to compare with
   int further_unknowns = 0;                // see judge()
+  std::string pose = "X_WC";               // what the camera's pose is: X_RC without a world, X_HC on a hand
 };
 
 // Parameters with sigmas, data-sheet form, verdict, deviations as quiver plot, histogram and list, coverage

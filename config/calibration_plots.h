@@ -3,14 +3,10 @@
 
 #include "calib/calibration.h"
 #include "calib/verdict.h"
+#include "config/plot_parts.h"
 #include "config/svg.h"
 
 namespace zeropose {
-
-// Where a plot stands on the page: its title above, its axis below.
-struct PlotFrame {
-  double x = 0, y = 0, width = 0, height = 0;  // mm
-};
 
 // The frame of the image's shape inside the given one.
 PlotFrame image_frame(const PlotFrame& frame, const CalibrationProblem& problem);

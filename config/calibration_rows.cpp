@@ -1,6 +1,7 @@
 #include "config/calibration_rows.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace zeropose {
 namespace {
@@ -84,6 +85,8 @@ std::vector<ParameterRow> parameter_rows(const CalibrationResult& result, double
     if (active)
       row.active = value_of(active->model, to_six_numbers(with_frame_offset(active->X_WC, frame_offset_z_mm)),
                             row.parameter);
+    if (row.active) row.difference = row.value - *row.active;
+    if (row.unit == "deg") row.difference = std::remainder(row.difference, 360);
     rows.push_back(row);
   }
   return rows;

@@ -17,6 +17,7 @@ struct ParameterRow {
   double value = 0;
   double sigma = -1;             // -1: held or not estimated
   std::optional<double> active;  // the same parameter of the active calibration
+  double difference = 0;         // from that; of angles -180 .. 180
 };
 
 // Those of the model and X_WC in six numbers, its frame moved along z by frame_offset_z_mm. `active` is given

@@ -179,6 +179,7 @@ Answer calibrate_ball(const BallOptions& options) {
   if (!good || poor) return no_camera(std::move(result), doubt);
   PointsOptions points = options.points;
   points.on_hand = places.in_hand;
+  points.pose = places.in_hand ? "X_HC" : places.X_WR ? "X_WC" : "X_RC";
   Answer answer = answer_of(points, *input, result, "A robot's ball: " + options.pixels);
   add_robot_poses(places, result, answer);
   return answer;

@@ -186,6 +186,7 @@ Answer calibrate_body(Options options) {
     if (control->fit.status != FrameFitStatus::ok) return without_control(*control);
   }
   PointsOptions in_body = options.points;
+  in_body.pose = "X_BC";
   if (control) in_body.output.clear();  // written with the pose in the world
   Calibrated found = calibrated(in_body, std::move(points),
                                 concat({"Body: ", std::filesystem::path(source).filename().string()}));

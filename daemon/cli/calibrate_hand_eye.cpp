@@ -7,11 +7,13 @@
 #include "config/atomic_file.h"
 #include "config/camera_file.h"
 #include "config/robot_tables.h"
+#include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
 #include "daemon/cli/convert.h"
 #include "daemon/cli/output.h"
 #include "daemon/cli/robot_answer.h"
+#include "daemon/cli/robot_report.h"
 
 namespace zeropose {
 namespace {
@@ -39,7 +41,7 @@ Example:
 Exit status: 0 done, 1 the views cannot give an answer (status and reason say why), 2 wrong usage or unreadable input.)";
 
 struct HandEyeOptions {
-  std::string setup, robot, points, camera, name, output;
+  std::string setup, robot, points, camera, name, output, report, active;
   std::optional<std::string> X_WR;
   double sigma_px = 0, robot_sigma_mm = 0, robot_sigma_deg = 0;
   bool replace = false, json = false;
@@ -155,6 +157,27 @@ void write_camera(const HandEyeOptions& options, const CameraFile& internals, co
   replace_file(options.output, camera_file_text(camera));
 }
 
+// X_HC or X_RC of the camera in use.
+std::optional<Pose> active_of(const HandEyeOptions& options) {
+  if (options.active.empty()) return std::nullopt;
+  const CameraFile active = load_camera(options.active, options.name);
+  if (!active.has_pose || active.camera.on_hand != in_hand(options))
+    throw std::invalid_argument(concat({options.active, ": found no ", in_hand(options) ? "X_HC" : "X_WC",
+                                        ", expected it: the pose of the camera in use"}));
+  if (in_hand(options)) return active.camera.X_WC;
+  const std::optional<Pose> X_WR = pose_of_option(options.X_WR, "--X-WR");
+  if (!X_WR)
+    throw std::invalid_argument(
+        "--active with eye-to-hand: expected --X-WR, the robot's base in the world (0,0,0,0,0,0 where they "
+        "are one)");
+  return X_WR->inverse() * active.camera.X_WC;
+}
+
+std::string source_of(const HandEyeOptions& options) {
+  return concat({"Robot: ", options.robot, ". Points: ", options.points, ". Camera: ", options.camera,
+                 options.name.empty() ? "" : " ", options.name});
+}
+
 Answer calibrate_hand_eye_of(const HandEyeOptions& options) {
   const CameraFile camera = load_camera(options.camera, options.name);
   const std::vector<HandEyeView> views = load_hand_eye_views(options.robot, options.points);
@@ -166,11 +189,15 @@ Answer calibrate_hand_eye_of(const HandEyeOptions& options) {
   problem.robot_sigma_mm = options.robot_sigma_mm;
   problem.robot_sigma_deg = options.robot_sigma_deg;
   refuse_contradictions(options);
+  const std::optional<Pose> active = active_of(options);
   const HandEyeResult result = calibrate_hand_eye(problem);
   const bool good = result.status == HandEyeStatus::ok;
   if (good && !options.output.empty()) write_camera(options, camera, result);
-  return {good ? done : no_answer, hand_eye_json(options, views, result),
-          hand_eye_text(options, views, result)};
+  Answer answer{good ? done : no_answer, hand_eye_json(options, views, result),
+                hand_eye_text(options, views, result)};
+  if (good && !options.report.empty())
+    write_page(options.report, hand_eye_report(problem, result, active, source_of(options)), answer);
+  return answer;
 }
 
 void add_options(cli::Verb verb, HandEyeOptions& options) {
@@ -199,6 +226,11 @@ void add_options(cli::Verb verb, HandEyeOptions& options) {
                   "x,y,z,rx,ry,rz of the robot's base in the world, for --output with eye-to-hand");
   verb.add_option("--output", options.output, "camera JSON to write: with X_HC, or with X_WC = X_WR X_RC");
   verb.add_flag("--replace", options.replace, "overwrite --output");
+  const VerbOption report =
+      verb.add_option("--report", options.report, "the report as a page (SVG) to write");
+  verb.add_option("--active", options.active,
+                  "camera JSON in use, for the report to compare with; eye-to-hand with --X-WR")
+      .needs(report);
   verb.add_flag(
       "--json", options.json,
       "one JSON object on stdout: status, reason, X_HC and X_RB or X_RC and X_HB, sigma, covariance (6x6, "

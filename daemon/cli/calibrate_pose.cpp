@@ -10,6 +10,7 @@
 #include "daemon/cli/calibrate.h"
 #include "daemon/cli/convert.h"
 #include "daemon/cli/output.h"
+#include "daemon/cli/place_report.h"
 
 namespace zeropose {
 namespace {
@@ -34,7 +35,7 @@ Exit status: 0 done, 1 the points cannot give an answer (status and reason say w
 unreadable input.)";
 
 struct PoseOnlyOptions {
-  std::string camera, name, points, output;
+  std::string camera, name, points, output, report, active;
   std::vector<std::string> features, features_world;
   std::optional<std::string> residual;
   double sigma_px = 0, feature_sigma_mm = HousingFeature{}.sigma_mm;
@@ -111,6 +112,20 @@ std::string answer_text(const PoseOnlyResult& result) {
   return text.str();
 }
 
+std::optional<Pose> active_of(const PoseOnlyOptions& options) {
+  if (options.active.empty()) return std::nullopt;
+  const CameraFile active = load_camera(options.active, options.name);
+  if (!active.has_pose || active.camera.on_hand)
+    throw std::invalid_argument(options.active +
+                                ": found no X_WC, expected it: the pose of the camera in use");
+  return active.camera.X_WC;
+}
+
+std::string source_of(const PoseOnlyOptions& options) {
+  return (options.points.empty() ? "" : "Points: " + options.points + ". ") + "Camera: " + options.camera +
+         (options.name.empty() ? "" : " " + options.name);
+}
+
 Answer calibrate_pose_of(const PoseOnlyOptions& options) {
   const std::vector<HousingFeature> features = features_of(options);
   const CameraFile camera = load_camera(options.camera, options.name);
@@ -124,11 +139,14 @@ Answer calibrate_pose_of(const PoseOnlyOptions& options) {
   const std::string residual = options.residual.value_or(features.empty() ? "reprojection" : "algebraic");
   problem.residual = residual == "algebraic" ? Residual::algebraic : Residual::reprojection;
   if (!options.output.empty()) refuse_existing(options.output, options.replace);
+  const std::optional<Pose> active = active_of(options);
   const PoseOnlyResult result = calibrate_pose(problem);
-  if (result.status == PoseOnlyStatus::ok && !options.output.empty())
-    write_moved_camera(options.output, camera, result.X_WC);
-  return {result.status == PoseOnlyStatus::ok ? done : no_answer, answer_json(points, result),
-          answer_text(result)};
+  const bool good = result.status == PoseOnlyStatus::ok;
+  if (good && !options.output.empty()) write_moved_camera(options.output, camera, result.X_WC);
+  Answer answer{good ? done : no_answer, answer_json(points, result), answer_text(result)};
+  if (good && !options.report.empty())
+    write_page(options.report, pose_report(problem, result, active, source_of(options)), answer);
+  return answer;
 }
 
 }  // namespace
@@ -141,6 +159,10 @@ void add_calibrate_pose(cli::Verb calibrate, int& exit_status) {
   verb.add_option("--name", options->name, "of the camera, where the file holds several");
   verb.add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
   verb.add_flag("--replace", options->replace, "overwrite --output");
+  const VerbOption report =
+      verb.add_option("--report", options->report, "the report as a page (SVG) to write");
+  verb.add_option("--active", options->active, "camera JSON in use, for the report to compare with")
+      .needs(report);
   verb.add_option("--points", options->points, "CSV: x_mm y_mm z_mm u_px v_px [suu svv suv]");
   verb.add_option("--feature", options->features, "FX,FY,FZ of a point on the housing, in the camera's frame")
       .once_per_value();

@@ -7,6 +7,9 @@
 #include "config/text.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/convert.h"
+#include "daemon/cli/output.h"
+#include "daemon/cli/place_report.h"
 
 namespace zeropose {
 namespace {
@@ -29,7 +32,8 @@ Exit status: 0 done, 1 the points cannot give an answer (status and reason say w
 unreadable input.)";
 
 struct Options {
-  std::string cameras, points, observations, robot;
+  std::string cameras, points, observations, robot, report;
+  std::optional<std::string> active;
   double sigma_mm = KnownPoint{}.sigma_mm;
   bool json = false;
 };
@@ -103,10 +107,19 @@ Answer calibrate(const Options& options) {
   std::optional<NamedPoses> hand;
   if (!options.robot.empty()) hand = load_named_poses(options.robot);
   input.sightings = load_sightings(options.observations, input.cameras, input.points, hand);
-  const SensorResult result = calibrate_sensor({input.cameras, input.points, input.sightings});
+  const SensorProblem problem{input.cameras, input.points, input.sightings};
+  const std::optional<Pose> active = pose_of_option(options.active, "--active");
+  const SensorResult result = calibrate_sensor(problem);
   const char* pose = hand ? "X_HS" : "X_WS";
-  return {result.fit.status == FrameFitStatus::ok ? done : no_answer, sensor_json(input, result, pose),
-          sensor_text(input, result, pose)};
+  const bool good = result.fit.status == FrameFitStatus::ok;
+  Answer answer{good ? done : no_answer, sensor_json(input, result, pose), sensor_text(input, result, pose)};
+  if (good && !options.report.empty())
+    write_page(options.report,
+               sensor_report(problem, result, pose, active,
+                             concat({"Cameras: ", options.cameras, ". Points: ", options.points,
+                                     ". Observations: ", options.observations})),
+               answer);
+  return answer;
 }
 
 }  // namespace
@@ -124,6 +137,10 @@ void add_calibrate_sensor(cli::Verb calibrate_verb, int& exit_status) {
   verb.add_option("--robot", options->robot, "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, X_RH");
   verb.add_option("--sigma-mm", options->sigma_mm, "of one coordinate of a known point (0.02)")
       .range(1e-6, 100.0);
+  const VerbOption report =
+      verb.add_option("--report", options->report, "the report as a page (SVG) to write");
+  verb.add_option("--active", options->active, "x,y,z,rx,ry,rz in use, for the report to compare with")
+      .needs(report);
   verb.add_flag("--json", options->json,
                 "one JSON object on stdout: status, reason, X_WS or X_HS, sigma, covariance, rms_mm, points\n"
                 "[{point, view, p_S, residual_mm, ray_gap_mm, removed, suspect}]");

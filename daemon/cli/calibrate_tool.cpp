@@ -1,12 +1,16 @@
 #include <algorithm>
 #include <memory>
+#include <optional>
 #include <sstream>
 
 #include "calib/tool.h"
 #include "config/robot_tables.h"
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
+#include "daemon/cli/convert.h"
+#include "daemon/cli/output.h"
 #include "daemon/cli/robot_answer.h"
+#include "daemon/cli/robot_report.h"
 
 namespace zeropose {
 namespace {
@@ -27,7 +31,8 @@ Exit status: 0 done, 1 the touches cannot give an answer (status and reason say 
 unreadable input.)";
 
 struct ToolOptions {
-  std::string touches;
+  std::string touches, report;
+  std::optional<std::string> active;
   double sigma_mm = 0;
   bool json = false;
 };
@@ -87,14 +92,20 @@ std::string tool_text(const std::vector<HandPose>& touches, const ToolResult& re
 
 Answer calibrate_tool_of(const ToolOptions& options) {
   const std::vector<HandPose> touches = load_hand_poses(options.touches, "touch", false);
+  std::optional<Eigen::Vector3d> active_mm;
+  if (options.active) active_mm = place_of_option(*options.active, "--active");
   std::vector<Pose> X_RH;
   for (const HandPose& touch : touches) X_RH.push_back(touch.X_RH);
   ToolProblem problem;
   problem.X_RH = X_RH;
   problem.sigma_mm = options.sigma_mm;
   const ToolResult result = calibrate_tool(problem);
-  return {result.status == ToolStatus::ok ? done : no_answer, tool_json(touches, result),
-          tool_text(touches, result)};
+  const bool good = result.status == ToolStatus::ok;
+  Answer answer{good ? done : no_answer, tool_json(touches, result), tool_text(touches, result)};
+  if (good && !options.report.empty())
+    write_page(options.report, tool_report(touches, result, active_mm, "Touches: " + options.touches),
+               answer);
+  return answer;
 }
 
 }  // namespace
@@ -109,6 +120,10 @@ void add_calibrate_tool(cli::Verb calibrate, int& exit_status) {
   verb.add_option("--sigma-mm", options->sigma_mm,
                   "of one coordinate of a touch; without it from the residuals")
       .range(1e-6, 100.0);
+  const VerbOption report =
+      verb.add_option("--report", options->report, "the report as a page (SVG) to write");
+  verb.add_option("--active", options->active, "X,Y,Z of the tool in use, for the report to compare with")
+      .needs(report);
   verb.add_flag(
       "--json", options->json,
       "one JSON object on stdout: status, reason, p_HT, fixed_point, residuals_mm, sigma, covariance (3x3,\n"

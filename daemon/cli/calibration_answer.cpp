@@ -64,7 +64,7 @@ Json comparison_json(const CalibrationReport& report) {
                {"moved_mm", comparison.moved_mm},
                {"turned_deg", comparison.turned_deg}};
   for (const ParameterRow& row : parameter_rows(report.result, 0, report.active))
-    if (row.active) json["difference"][std::string(name_of(row.parameter))] = row.value - *row.active;
+    if (row.active) json["difference"][std::string(name_of(row.parameter))] = row.difference;
   for (const PixelShift& shift : comparison.shifts)
     json["shifts"].push_back({{"at_px", json_of(shift.at_px)},
                               {"internals_px", shift.internals_px ? json_of(*shift.internals_px) : Json()},
@@ -102,7 +102,7 @@ void print_parameters(std::ostream& text, const CalibrationReport& report, bool 
       cell(row.sigma);
     if (row.active) {
       cell(*row.active);
-      cell(row.value - *row.active);
+      cell(row.difference);
     }
     text << "\n";
   }

@@ -7,7 +7,9 @@
 
 #include "config/atomic_file.h"
 #include "config/camera_file.h"
+#include "config/fit_page.h"
 #include "config/text.h"
+#include "daemon/cli/answer.h"
 
 namespace zeropose::cli {
 
@@ -27,6 +29,12 @@ inline void write_moved_camera(const std::filesystem::path& path, CameraFile cam
   camera.camera.on_hand = false;
   camera.camera.X_WC = X_WC;
   replace_file(path, camera_file_text(camera));
+}
+
+// The page of a report.
+inline void write_page(const std::filesystem::path& path, const FitReport& report, Answer& answer) {
+  replace_file(path, fit_page(report));
+  answer.text += concat({"written: ", path.string(), "\n"});
 }
 
 }  // namespace zeropose::cli

@@ -126,7 +126,8 @@ void write_files(const PointsOptions& options, const CalibrationReport& report, 
 Answer cli::answer_of(const PointsOptions& options, const PointsInput& input, const CalibrationResult& result,
                       const std::string& source) {
   const CalibrationReport report{
-      input.problem, result, options.name, source, options.pitch_mm, options.frame_offset_z_mm, input.active};
+      input.problem, result, options.name, source, options.pitch_mm, options.frame_offset_z_mm,
+      input.active,  0,      options.pose};
   Answer answer;
   answer.json = calibration_json(report);
   answer.text = calibration_text(report, options.angles == "rad");

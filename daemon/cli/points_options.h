@@ -20,7 +20,8 @@ struct PointsOptions {
   std::vector<std::string> fix;
   int width_px = 0, height_px = 0;
   double reject_px = 0, reject_mm = 0, sigma_px = 0, robust = 0, pitch_mm = 0, frame_offset_z_mm = 0;
-  bool on_hand = false;  // of a robot: the camera that is written has X_HC
+  bool on_hand = false;       // of a robot: the camera that is written has X_HC
+  std::string pose = "X_WC";  // what the report calls the camera's pose
   bool search_origin = false, one_focal = false, replace = false, json = false;
 };
 

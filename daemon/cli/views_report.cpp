@@ -44,7 +44,7 @@ std::string page_of_camera(const CalibrationViews& input, const ViewsProblem& pr
   part.sigma_px = problem.sigma_px;
   part.reject_px = problem.reject_px;
   return calibration_page(
-      {part, own, input.cameras[camera], source, 0, 0, {}, 6 * static_cast<int>(views.size())});
+      {part, own, input.cameras[camera], source, 0, 0, {}, 6 * static_cast<int>(views.size()), "X_WC"});
 }
 
 }  // namespace zeropose

@@ -4,7 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "config/calibration_rows.h"
+#include "config/fit_page.h"
 #include "config/svg.h"
 
 namespace zeropose {
@@ -38,7 +41,9 @@ struct Example {
     result.steps = {{"C2 non-coplanar", "first & <foremost>", 0.5}};
     result.diagnosis.warnings = {"a warning \"in quotes\""};
   }
-  CalibrationReport report() const { return {problem, result, "left <1>", "points.csv", 0.005, 0, {}}; }
+  CalibrationReport report() const {
+    return {problem, result, "left <1>", "points.csv", 0.005, 0, {}, 0, "X_WC"};
+  }
 };
 
 std::size_t count_of(const std::string& text, const std::string& part) {
@@ -114,6 +119,104 @@ TEST(CalibrationPage, NoPointsAndNoNoise) {
   Example unused(10);
   for (auto& deviation : unused.result.deviations) deviation.used = false;
   expect_well_formed(calibration_page(unused.report()));
+}
+
+TEST(CalibrationPage, TheOutlineStaysInItsPlot) {
+  Example example(30);
+  example.points[0].u_px = {-400, 900};  // far outside of the image
+  const std::string page = calibration_page(example.report());
+  const std::size_t outline = page.find("<polygon", page.find("Used points per cell"));
+  ASSERT_NE(outline, std::string::npos);
+  EXPECT_GT(page.rfind("<g clip-path", outline), page.find("Used points per cell"));
+}
+
+FitReport fit_example() {
+  FitReport report;
+  report.title = "A fit <1>";
+  report.summary = "2 of 3 touches";
+  report.findings = {{Quality::good, "redundancy & more"}};
+  Matrix6 covariance = Matrix6::Zero();
+  covariance.diagonal() << 0.04, 0.04, 0.04, 1e-4, 1e-4, 1e-4;
+  report.result = {"X_HC",
+                   pose_rows(from_six_numbers({1, 2, 3, 10, 20, 179.5}), covariance,
+                             from_six_numbers({1, 2, 2.5, 10, 20, -179.5})),
+                   "a note"};
+  report.beside = {"p_RT", place_rows({7, 8, 9}, Eigen::Matrix3d::Identity()), ""};
+  report.facts = {{"a figure", "0.125 mm"}};
+  report.errors = {{"Errors, mm", {{"one", 0.1, true}, {"two", 0.2, true}, {"three", 25, false}}}};
+  const std::vector<Pose> X_RH = {from_six_numbers({0, 0, 0, 10, 0, 0}),
+                                  from_six_numbers({0, 0, 0, -10, 0, 0}),
+                                  from_six_numbers({0, 0, 0, 0, 0, 0})};
+  const std::vector<std::size_t> unused = {2};
+  report.turns = hand_turns(X_RH, unused);
+  report.list = {
+      "Touches", "", {{"name", 0, true}, {"mm", 40}}, {{{"one", "0.1"}, true}, {{"three", "25"}, false}},
+      1,         182};
+  add_warnings(report, {"a warning \"in quotes\""});
+  return report;
+}
+
+TEST(FitPage, ShowsWhatItIsGiven) {
+  const Example example(30);
+  FitReport report = fit_example();
+  report.images = {{"left", example.result.model, example.points, example.result.deviations, {}}};
+  const std::string page = fit_page(report);
+  expect_well_formed(page);
+  for (const char* part : {"A fit &lt;1&gt;", "2 of 3 touches", "redundancy &amp; more", "a note", ">0.200<",
+                           ">0.5730<", ">0.500<", ">-1.0000<", "a figure", "Errors, mm", ">three<", ">25.0",
+                           "Turns of the hand", "a warning &quot;in quotes&quot;", "Camera left",
+                           "Deviations over the image", "Used points per cell", "Coverage"})
+    EXPECT_THAT(page, HasSubstr(part));
+  EXPECT_EQ(count_of(page, "r=\"0.450\""), 30u);  // a dot per point
+  // What is warned of comes first and gives the banner its colour.
+  EXPECT_LT(page.find("a warning"), page.find("redundancy"));
+  EXPECT_THAT(page, HasSubstr("fill=\"#b26a00\" text-anchor=\"start\" font-weight=\"bold\">2 of 3"));
+}
+
+TEST(FitPage, PlotsAreNotCutByTheEndOfAPage) {
+  const Example example(30);
+  for (const int touches : {1, 10, 20, 30, 40, 60}) {
+    FitReport report = fit_example();
+    report.list.rows.assign(static_cast<std::size_t>(touches), {{"one", "0.1"}, true});
+    report.images = {{"", example.result.model, example.points, example.result.deviations, {}}};
+    const std::string page = fit_page(report);
+    const std::string title = ">Deviations over the image";
+    const std::size_t at = page.rfind(" y=\"", page.find(title));
+    ASSERT_NE(at, std::string::npos);
+    const double y = std::stod(page.substr(at + 4)), on_page = std::fmod(y, 297.0);
+    EXPECT_LE(on_page + 2 + 69 + 7, 297.0) << touches;  // 800 x 600 px in 92 mm, the axis below
+    EXPECT_GE(on_page, 14) << touches;
+  }
+}
+
+TEST(FitPage, OnlyWhatIsThere) {
+  FitReport report;
+  report.title = "Nothing";
+  const std::string page = fit_page(report);
+  expect_well_formed(page);
+  for (const char* part : {"Turns", "Deviations", "Coverage", "Figures"})
+    EXPECT_THAT(page, Not(HasSubstr(part)));
+}
+
+TEST(FitPage, TurnsAreFromTheMeanAboutTheHand) {
+  std::vector<Pose> X_RH;
+  for (const double rx_deg : {-30., 0., 30.})
+    X_RH.push_back(from_six_numbers({1, 2, 3, 0, 0, 40}) * from_six_numbers({0, 0, 0, rx_deg, 0, 0}));
+  const std::vector<std::size_t> unused = {1};
+  const auto turns = hand_turns(X_RH, unused);
+  ASSERT_EQ(turns.size(), 3u);
+  EXPECT_NEAR(turns[0].about_H_deg.x(), -30, 1e-9);
+  EXPECT_NEAR(turns[2].about_H_deg.x(), 30, 1e-9);
+  EXPECT_NEAR(turns[2].about_H_deg.tail<2>().norm(), 0, 1e-9);
+  EXPECT_FALSE(turns[1].used);
+}
+
+TEST(CalibrationRows, AnglesDifferTheShortWay) {
+  Example example(5);
+  example.result.X_WC = from_six_numbers({0, 0, 0, 179.5, 0, 0});
+  const CalibratedCamera active{"", example.result.model, from_six_numbers({0, 0, 0, -179.5, 0, 0})};
+  const auto rows = parameter_rows(example.result, 0, active);
+  EXPECT_NEAR(rows[8].difference, -1, 1e-9);
 }
 
 TEST(CalibrationRows, DifferencesOnlyWhereTheModelIsTheSame) {

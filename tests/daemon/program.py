@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 import unittest
+import xml.dom.minidom
 
 PROGRAM = sys.argv[1]
 
@@ -18,6 +19,12 @@ def run_json(*arguments, stdin=""):
     status, out, err = run(*arguments, "--json", stdin=stdin)
     assert out.count("\n") == 1 and out.endswith("\n"), f"one line of JSON expected: {out!r} {err!r}"
     return status, json.loads(out), err
+
+
+def page_texts(path):
+    """All words of a report's page; it must be XML."""
+    document = xml.dom.minidom.parse(str(path))
+    return [node.firstChild.data for node in document.getElementsByTagName("text") if node.firstChild]
 
 
 class Case(unittest.TestCase):

@@ -9,7 +9,7 @@ import re
 import sys
 import unittest
 
-from program import Case, run, run_json
+from program import Case, page_texts, run, run_json
 
 SOURCE = pathlib.Path(sys.argv[2])
 CAMERA = {"model": "division", "width": 768, "height": 572, "fx": 4200, "fy": 4195, "cx": 383.5, "cy": 285.5,
@@ -250,6 +250,19 @@ class CalibratePose(Case):
         self.expect_near(answer["X_WC"][:3], wanted[:3], 0.01)
         self.expect_near(answer["X_WC"][3:], wanted[3:], 0.005)
         self.assertEqual((len(answer["sigma"]), len(answer["deviations"])), (6, 4))
+
+    def test_the_page(self):
+        wanted = self.published()
+        page = self.path("page.svg")
+        used = self.write("used.json", json.dumps({**json.loads(self.camera.read_text()), "X_WC": wanted}))
+        pose = ["calibrate", "pose", "--camera", self.camera, "--points", self.points, *self.feature, "--report", page]
+        status, answer, err = run_json(*pose, "--active", used)
+        self.assertEqual(status, 0, err)
+        texts = page_texts(page)
+        for part in ("%.3f" % answer["X_WC"][0], "%.3f" % wanted[0], "%.4f" % answer["sigma"][3], "Points on the housing",
+                     "Histogram", "4 of 4 points fit within %.3f px RMS." % answer["rms_px"]):
+            self.assertIn(part, texts)
+        self.expect_refused(run(*pose, "--active", self.camera), "found no X_WC")
 
     def test_framework(self):
         self.published()

@@ -10,7 +10,7 @@ import random
 import sys
 import unittest
 
-from program import Case, run, run_json
+from program import Case, page_texts, run, run_json
 
 SOURCE = pathlib.Path(sys.argv[2])
 CAMERA = {"model": "division", "width": 768, "height": 572, "fx": 1930.0, "fy": 1925.0, "cx": 395.0, "cy": 279.0, "K": -0.2}
@@ -94,6 +94,24 @@ class Tool(RobotCase):
         self.assertEqual((status, answer["removed"]), (0, ["C"]), answer["reason"])
         self.expect_near(answer["p_HT"], self.END, 1e-6)
 
+    def test_the_page(self):
+        page = self.path("page.svg")
+        rows = self.touches()
+        rows[2][0] += 4
+        self.table("t.csv", "touch," + POSE, [["ABCDEF"[i], *row] for i, row in enumerate(rows)])
+        tool = ["calibrate", "tool", "--touches", self.path("t.csv"), "--sigma-mm", 0.05]
+        self.assertIn("written: ", run(*tool, "--report", page, "--active=35,-12,179")[1])
+        texts = page_texts(page)
+        for part in ("180.000", "179.000", "1.000", "900.000", "A", "F", "4.000", "left out: it contradicts the others",
+                     "Turns of the hand", "5 of 6"):
+            self.assertIn(part, texts)
+        self.expect_refused(run(*tool, "--active", "1,2,3"), "--report")
+        self.expect_refused(run(*tool, "--report", page, "--active", "1,2"), "--active")
+        # Without an answer no page.
+        none = self.path("none.svg")
+        self.assertEqual(self.tool(rows[:2], "--report", none)[0], 1)
+        self.assertFalse(none.exists())
+
     def test_units(self):
         status, answer, _ = self.tool(self.touches(change=lambda row: [x / 1000 for x in row[:3]] + row[3:]))
         self.assertEqual(status, 0)
@@ -155,6 +173,24 @@ class HandEye(RobotCase):
             written = json.loads(output.read_text())
             self.assertEqual([pose for pose in ("X_HC", "X_WC") if pose in written], [key])
             self.expect_near(written[key], answer["X_HC" if setup == "eye-in-hand" else "X_RC"], 1e-9)
+
+    def test_the_page(self):
+        page, camera = self.path("page.svg"), self.path("used.json")
+        in_use = six(self.X_FC)
+        in_use[2] -= 1
+        for setup, key, other, base in (("eye-in-hand", "X_HC", "X_RB", []), ("eye-to-hand", "X_RC", "X_HB", ["--X-WR", "100,0,0,0,0,0"])):
+            X_WC = in_use if not base else [in_use[0] + 100, *in_use[1:]]
+            self.write("used.json", json.dumps({**CAMERA, "X_WC" if base else "X_HC": X_WC}))
+            status, answer, err = run_json(*self.scene(setup), *base, "--report", page, "--active", camera)
+            self.assertEqual(status, 0, err)
+            texts = page_texts(page)
+            for part in ("Error of each view, mm", "Error of each view, deg", "Turns of the hand", "Histogram", "v0", "v7",
+                         "8 of 8 views agree within %.3f mm and %.4f deg RMS." % (answer["rms_mm"], answer["rms_deg"]),
+                         "%.3f" % answer[key][0], "%.4f" % answer[other][5], "%.3f" % (answer[key][2] - in_use[2]),
+                         "v7 16"):
+                self.assertIn(part, texts)
+        self.expect_refused(run(*self.scene("eye-to-hand"), "--report", page, "--active", camera), "--X-WR")
+        self.expect_refused(run(*self.scene("eye-in-hand"), "--report", page, "--active", camera), "used.json", "X_HC")
 
     def test_inverted_poses_and_units(self):
         status, answer, _ = run_json(*self.scene("eye-to-hand", change=lambda row: six(inverse(matrix(row)))))

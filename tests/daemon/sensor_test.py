@@ -4,7 +4,7 @@ import json
 import sys
 import unittest
 
-from program import Case, run, run_json
+from program import Case, page_texts, run, run_json
 
 FOCAL, BASE = 1000, 200
 PLACES = [(-100, -80, 900), (110, -70, 1000), (90, 80, 850), (-90, 75, 1050), (20, 10, 950)]
@@ -52,6 +52,17 @@ class Sensor(Case):
         self.stationary(PLACES, wrong=5)
         status, found, err = self.calibrate()
         self.assertEqual((status, [p["point"] for p in found["points"] if p["removed"]]), (0, ["p2"]), err)
+
+    def test_the_page(self):
+        page = self.path("page.svg")
+        self.stationary(PLACES, wrong=5)
+        self.calibrate("--report", page, "--active", "1000,2000,49,0,0,90")
+        texts = page_texts(page)
+        for part in ("2000.000", "49.000", "1.000", "p4", "Camera left", "Camera right", "4 of 5 points fit within 0.000 mm RMS.",
+                     "left out: it contradicts the others"):
+            self.assertIn(part, texts)
+        self.calibrate(*self.hand(PLACES), "--report", page)
+        self.assertIn("X_HS, the sensor in the hand", page_texts(page))
 
     def test_points_on_a_line(self):
         self.stationary([(0, 10 * k, 900) for k in range(4)])
