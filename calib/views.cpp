@@ -38,6 +38,7 @@ Freedom freedom_of(const ViewsProblem& problem) {
   freedom.cameras.assign(problem.cameras.size(), true);
   freedom.cameras.front() = any_known;
   for (const ViewsCamera& camera : problem.cameras) freedom.internals.push_back(directions_of(camera));
+  if (problem.stage == StageAxes::estimate) freedom.stage = stage_of(problem);
   return freedom;
 }
 
@@ -48,6 +49,7 @@ Verdict check_redundancy(std::span<const Chunk> chunks, const Freedom& freedom) 
     unknowns += static_cast<std::size_t>(directions.cols());
   unknowns += 6 * static_cast<std::size_t>(std::ranges::count(freedom.cameras, true) +
                                            std::ranges::count(freedom.views, true));
+  if (freedom.stage) unknowns += static_cast<std::size_t>(freedom.stage->directions.cols());
   if (equations > unknowns) return {};
   return refused(Status::too_few_points, number(equations) + " equations (two per point) for " +
                                              number(unknowns) + " unknowns: more points or views are needed");

@@ -30,28 +30,39 @@ Pose pose_of(const double* numbers) {
   return X;
 }
 
+// It may move along some directions only, too.
 class PoseManifold : public ceres::Manifold {
  public:
+  explicit PoseManifold(const Eigen::MatrixXd& directions = Matrix6::Identity())
+      : directions_(directions),
+        inverse_(Eigen::MatrixXd(directions.transpose() * directions).ldlt().solve(directions.transpose())) {}
   int AmbientSize() const override { return pose_size; }
-  int TangentSize() const override { return 6; }
+  int TangentSize() const override { return static_cast<int>(directions_.cols()); }
   bool Plus(const double* x, const double* delta, double* sum) const override {
     Map<PoseNumbers> target(sum);
-    target = numbers_of(moved(pose_of(x), Map<const Vector6>(delta)));
+    target =
+        numbers_of(moved(pose_of(x), directions_ * Map<const Eigen::VectorXd>(delta, directions_.cols())));
     return true;
   }
   bool PlusJacobian(const double*, double* jacobian) const override {
-    Map<RowMatrix>(jacobian, pose_size, 6) = RowMatrix::Identity(pose_size, 6);
+    Map<RowMatrix> target(jacobian, pose_size, directions_.cols());
+    target.topRows<6>() = directions_;
+    target.row(6).setZero();
     return true;
   }
   bool Minus(const double* y, const double* x, double* delta) const override {
-    Map<Vector6> target(delta);
-    target = difference(pose_of(x), pose_of(y));
+    Map<Eigen::VectorXd>(delta, directions_.cols()) = inverse_ * difference(pose_of(x), pose_of(y));
     return true;
   }
   bool MinusJacobian(const double*, double* jacobian) const override {
-    Map<RowMatrix>(jacobian, 6, pose_size) = RowMatrix::Identity(6, pose_size);
+    Map<RowMatrix> target(jacobian, directions_.cols(), pose_size);
+    target.leftCols<6>() = inverse_;
+    target.col(6).setZero();
     return true;
   }
+
+ private:
+  Eigen::MatrixXd directions_, inverse_;
 };
 
 // Internals that may move along some directions only: some are held, and with one focal length two move as
@@ -122,15 +133,17 @@ ShortEquations shortened(const Equations& equations) {
   return result;
 }
 
-// Parameters: internals, X_WC, X_WB.
+// Parameters: internals, X_WC, X_WB or, where a stage moves the board, X_BS.
 class ChunkCost : public ceres::SizedCostFunction<short_rows, internals_count, pose_size, pose_size> {
  public:
-  ChunkCost(const CameraModel& model, const Chunk& chunk, double loss)
-      : model_(model), chunk_(chunk), loss_(loss) {}
+  ChunkCost(const CameraModel& model, const Chunk& chunk, const Stage* stage, double loss)
+      : model_(model), chunk_(chunk), stage_(stage), loss_(loss) {}
 
   bool Evaluate(const double* const* parameters, double* residuals, double** jacobians) const override {
     const CameraModel model = with_internals(model_, Map<const Internals>(parameters[0]));
-    const Pose X_WC = pose_of(parameters[1]), X_WB = pose_of(parameters[2]), X_CB = X_WC.inverse() * X_WB;
+    const Pose X_WC = pose_of(parameters[1]), last = pose_of(parameters[2]);
+    const Pose X_WB = stage_ != nullptr ? stage_->X_WB(chunk_.view, last) : last,
+               X_CB = X_WC.inverse() * X_WB;
     if (!(model.fx_px > 0) || !(model.fy_px > 0)) return false;
     Map<Eigen::Matrix<double, short_rows, 1>> r(residuals);
     if (jacobians == nullptr) {
@@ -146,7 +159,9 @@ class ChunkCost : public ceres::SizedCostFunction<short_rows, internals_count, p
     if (jacobians[0] != nullptr)
       Map<RowMatrix>(jacobians[0], short_rows, internals_count) = rows.J.leftCols<internals_count>();
     if (jacobians[1] != nullptr) write_pose(rows.J, by_camera(X_WC, X_WB), jacobians[1]);
-    if (jacobians[2] != nullptr) write_pose(rows.J, by_view(X_WC), jacobians[2]);
+    const Matrix6 by_last =
+        stage_ != nullptr ? stage_->by_stage(chunk_.view, last) : Matrix6(Matrix6::Identity());
+    if (jacobians[2] != nullptr) write_pose(rows.J, by_view(X_WC) * by_last, jacobians[2]);
     return true;
   }
 
@@ -159,6 +174,7 @@ class ChunkCost : public ceres::SizedCostFunction<short_rows, internals_count, p
 
   const CameraModel& model_;
   const Chunk& chunk_;
+  const Stage* stage_;
   double loss_;
 };
 
@@ -178,18 +194,23 @@ class Progress : public ceres::IterationCallback {
 struct Blocks {
   std::vector<Internals> internals;
   std::vector<PoseNumbers> cameras, views;
+  PoseNumbers stage;
 
-  explicit Blocks(const State& state) {
+  explicit Blocks(const State& state) : stage(numbers_of(state.X_BS)) {
     for (const CameraModel& model : state.models) internals.push_back(internals_of(model));
     for (const Pose& X_WC : state.X_WC) cameras.push_back(numbers_of(X_WC));
     for (const Pose& X_WB : state.X_WB) views.push_back(numbers_of(X_WB));
   }
-  void write(State& state) const {
+  void write(State& state, const Freedom& freedom) const {
     for (std::size_t c = 0; c < cameras.size(); ++c) {
       state.models[c] = with_internals(state.models[c], internals[c]);
       state.X_WC[c] = pose_of(cameras[c].data());
     }
-    for (std::size_t v = 0; v < views.size(); ++v) state.X_WB[v] = pose_of(views[v].data());
+    state.X_BS = pose_of(stage.data());
+    for (std::size_t v = 0; v < views.size(); ++v) {
+      const Stage* mover = mover_of(freedom, v);
+      state.X_WB[v] = mover != nullptr ? mover->X_WB(v, state.X_BS) : pose_of(views[v].data());
+    }
   }
 };
 
@@ -212,6 +233,8 @@ void set_freedom(ceres::Problem& problem, Blocks& blocks, const Freedom& freedom
       problem.SetManifold(internals, new InternalsManifold(freedom.internals[c]));
   }
   for (std::size_t v = 0; v < blocks.views.size(); ++v) pose(blocks.views[v].data(), freedom.views[v]);
+  if (problem.HasParameterBlock(blocks.stage.data()))
+    problem.SetManifold(blocks.stage.data(), new PoseManifold(freedom.stage->directions));
 }
 
 // BoardView poses are eliminated first. Without a free view, or with nothing else free, there is nothing to
@@ -227,6 +250,7 @@ void set_solver(ceres::Solver::Options& options, const ceres::Problem& problem, 
   for (PoseNumbers& view : blocks.views) views += add(view.data(), 0);
   for (PoseNumbers& camera : blocks.cameras) others += add(camera.data(), 1);
   for (Internals& internals : blocks.internals) others += add(internals.data(), 1);
+  others += add(blocks.stage.data(), 1);
   const bool schur = views > 0 && others > 0;
   options.linear_solver_type = schur ? ceres::DENSE_SCHUR : ceres::DENSE_QR;
   if (schur) options.linear_solver_ordering = ordering;
@@ -237,10 +261,12 @@ void set_solver(ceres::Solver::Options& options, const ceres::Problem& problem, 
 Outcome refine(State& state, std::span<const Chunk> chunks, const Freedom& freedom, const Options& options) {
   Blocks blocks(state);
   ceres::Problem problem;
-  for (const Chunk& chunk : chunks)
-    problem.AddResidualBlock(new ChunkCost(state.models[chunk.camera], chunk, options.loss), nullptr,
+  for (const Chunk& chunk : chunks) {
+    const Stage* mover = mover_of(freedom, chunk.view);
+    problem.AddResidualBlock(new ChunkCost(state.models[chunk.camera], chunk, mover, options.loss), nullptr,
                              blocks.internals[chunk.camera].data(), blocks.cameras[chunk.camera].data(),
-                             blocks.views[chunk.view].data());
+                             mover != nullptr ? blocks.stage.data() : blocks.views[chunk.view].data());
+  }
   set_freedom(problem, blocks, freedom);
   ceres::Solver::Options solver;
   set_solver(solver, problem, blocks);
@@ -260,7 +286,7 @@ Outcome refine(State& state, std::span<const Chunk> chunks, const Freedom& freed
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   if (!summary.IsSolutionUsable()) return {};
-  blocks.write(state);
+  blocks.write(state, freedom);
   return {true, summary.termination_type == ceres::CONVERGENCE, static_cast<int>(summary.iterations.size())};
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calib/camera_model.h"
+#include "calib/views_stage.h"
 
 namespace zeropose::bundle {
 
@@ -27,13 +28,20 @@ struct Chunk {
 struct State {
   std::vector<CameraModel> models;
   std::vector<Pose> X_WC, X_WB;
+  Pose X_BS = Pose::Identity();  // see Stage; X_WB has it in it
 };
 
 // What may move: for every camera the directions in which its internals may (9 x n, orthogonal columns).
 struct Freedom {
   std::vector<Eigen::MatrixXd> internals;
   std::vector<bool> cameras, views;  // their poses
+  std::optional<Stage> stage = {};   // its X_BS; none: known poses are held as they are
 };
+
+// The stage, if it moves this view's board.
+inline const Stage* mover_of(const Freedom& freedom, std::size_t view) {
+  return freedom.stage && freedom.stage->moves(view) ? &*freedom.stage : nullptr;
+}
 
 // The equations of a chunk by the 9 internals and the 6 of moved(X_CB), as sums over its points:
 // sums = [J r]^T [J r] with r = projected - found, whitened and weighted by the loss.

@@ -222,6 +222,9 @@ Verdict check_problem(const ViewsProblem& problem) {
       return with_name(verdict, "view " + quoted(view.name));
   for (std::size_t i = 0; i < problem.points.size(); ++i)
     if (Verdict verdict = check_point(problem, i); verdict.status != Status::ok) return verdict;
+  if (problem.stage == StageAxes::estimate && !stage_of(problem))
+    return refused(Status::wrong_problem,
+                   "the stage's axes are to be estimated, but no two views have known poses that differ");
   return {};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "calib/eccentricity.h"
+#include "calib/views_stage_axes.h"
 #include "calib/views_uncertainty.h"
 #include "calib/words.h"
 
@@ -15,8 +16,6 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Status = CalibrationStatus;
 
-// No camera finds points better: what is not determined is so even if the residuals are (nearly) zero.
-constexpr double least_sigma_px = 0.05;
 constexpr double focal_refused = 0.1, focal_doubtful = 0.01;    // sigma as part of the focal length
 constexpr double origin_refused = 0.2, origin_doubtful = 0.01;  // sigma as part of the image width
 constexpr double nearly_parallel_deg = 3, little_tilt_deg = 10;
@@ -109,7 +108,10 @@ Doubt doubt_of(const ViewsCamera& camera, const CameraModel& model, const Eigen:
 }
 
 Verdict check_determined(const ViewsProblem& problem, const State& state, std::span<const Chunk> chunks,
-                         const UncertaintyAnswer& answer, double sigma_px) {
+                         const Freedom& freedom, const UncertaintyAnswer& answer, double sigma_px) {
+  if (freedom.stage)
+    if (const std::string unknown = unknown_axes(problem, state, chunks, freedom, answer); !unknown.empty())
+      return refused(Status::not_determined, unknown);
   for (std::size_t c = 0; c < problem.cameras.size(); ++c) {
     const Boards boards = boards_of(state, chunks, c);
     if (!answer.found) {
@@ -247,12 +249,9 @@ ViewsResult report_of(const ViewsProblem& problem, const State& state, std::span
   ViewsResult result;
   const UncertaintyAnswer answer = uncertainty_of(problem, state, chunks, freedom, problem.robust);
   result.residual_sum = cost_of(state, chunks, 0);
-  double equations = 0;
-  for (const Chunk& chunk : chunks) equations += 2 * static_cast<double>(chunk.points.size());
-  const double redundancy = answer.found ? equations - answer.found->unknowns : 1;
-  result.sigma_px =
-      problem.sigma_px > 0 ? problem.sigma_px : std::sqrt(result.residual_sum / std::max(1.0, redundancy));
-  const Verdict verdict = check_determined(problem, state, chunks, answer, result.sigma_px);
+  const Scatter scatter = scatter_of(problem, chunks, result.residual_sum, answer);
+  result.sigma_px = scatter.sigma_px;
+  const Verdict verdict = check_determined(problem, state, chunks, freedom, answer, result.sigma_px);
   if (verdict.status != Status::ok || !answer.found) {
     result.status = verdict.status == Status::ok ? Status::not_determined : verdict.status;
     result.reason = verdict.reason;
@@ -268,6 +267,11 @@ ViewsResult report_of(const ViewsProblem& problem, const State& state, std::span
     warn_of_camera(problem, state, chunks, c, *answer.found, result);
   }
   warn_of_views(problem, result);
+  if (freedom.stage)
+    result.stage = stage_estimate(problem, state, chunks, freedom, *answer.found);
+  else
+    check_stage(problem, state, chunks, freedom, scatter.redundancy, result);
+  if (result.stage) warn_of_stage(result);
   return result;
 }
 

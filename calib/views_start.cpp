@@ -139,6 +139,7 @@ bool set_poses(State& state, std::size_t camera, std::span<const Group> groups) 
 
 Freedom freedom_of_one(const Freedom& freedom, std::size_t camera, bool known) {
   Freedom one = freedom;
+  one.stage.reset();  // one camera may not tell
   for (std::size_t c = 0; c < one.cameras.size(); ++c) one.cameras[c] = known && c == camera;
   return one;
 }

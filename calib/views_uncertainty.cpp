@@ -1,6 +1,7 @@
 #include "calib/views_uncertainty.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "calib/symmetric_eigen.h"
@@ -13,10 +14,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Where the unknowns that all views share stand: the internals and the pose of every camera.
+// Where the unknowns that all views share stand: the internals and the pose of every camera, then the
+// stage's.
 struct Layout {
   std::vector<Index> internals, cameras;
-  Index size = 0;
+  Index stage = 0, stage_size = 0, size = 0;
 
   explicit Layout(const Freedom& freedom) {
     for (std::size_t c = 0; c < freedom.cameras.size(); ++c) {
@@ -25,6 +27,9 @@ struct Layout {
       cameras.push_back(size);
       if (freedom.cameras[c]) size += 6;
     }
+    stage = size;
+    stage_size = freedom.stage ? freedom.stage->directions.cols() : 0;
+    size += stage_size;
   }
 };
 
@@ -43,6 +48,9 @@ MatrixXd chain_of(const State& state, const Chunk& chunk, const Freedom& freedom
   if (freedom.cameras[chunk.camera])
     chain.block(internals_count, layout.cameras[chunk.camera], 6, 6) =
         by_camera(state.X_WC[chunk.camera], state.X_WB[chunk.view]);
+  if (const Stage* mover = mover_of(freedom, chunk.view))
+    chain.block(internals_count, layout.stage, 6, layout.stage_size) =
+        by_view(state.X_WC[chunk.camera]) * mover->by_stage(chunk.view, state.X_BS) * mover->directions;
   return chain;
 }
 
@@ -107,10 +115,21 @@ std::string names_of_weak(const ViewsProblem& problem, const Freedom& freedom, c
     if (freedom.cameras[c] && weakest.segment(layout.cameras[c], 6).cwiseAbs().maxCoeff() >= limit)
       names += (names.empty() ? "the pose" : ", the pose") + of;
   }
+  if (layout.stage_size > 0 &&
+      weakest.segment(layout.stage, layout.stage_size).cwiseAbs().maxCoeff() >= limit)
+    names += names.empty() ? "the stage's axes" : ", the stage's axes";
   return names;
 }
 
 }  // namespace
+
+Scatter scatter_of(const ViewsProblem& problem, std::span<const Chunk> chunks, double residual_sum,
+                   const UncertaintyAnswer& answer) {
+  int equations = 0;
+  for (const Chunk& chunk : chunks) equations += 2 * static_cast<int>(chunk.points.size());
+  const int redundancy = std::max(1, answer.found ? equations - answer.found->unknowns : 1);
+  return {problem.sigma_px > 0 ? problem.sigma_px : std::sqrt(residual_sum / redundancy), redundancy};
+}
 
 UncertaintyAnswer uncertainty_of(const ViewsProblem& problem, const State& state,
                                  std::span<const Chunk> chunks, const Freedom& freedom, double loss) {
@@ -138,8 +157,13 @@ UncertaintyAnswer uncertainty_of(const ViewsProblem& problem, const State& state
     if (freedom.cameras[c])
       result.cameras.back() = shared.matrix.block(layout.cameras[c], layout.cameras[c], 6, 6);
   }
+  result.stage = shared.matrix.block(layout.stage, layout.stage, layout.stage_size, layout.stage_size);
   for (std::size_t v = 0; v < own.size(); ++v) {
     result.views.push_back(own[v]);
+    if (const Stage* mover = mover_of(freedom, v)) {
+      const MatrixXd A = mover->by_stage(v, state.X_BS) * mover->directions;
+      result.views.back() = A * result.stage * A.transpose();
+    }
     if (!freedom.views[v]) continue;
     result.unknowns += 6;
     if (layout.size == 0) continue;

@@ -36,8 +36,13 @@ is then corrected (nx ny nz: its normal, else 0 0 1).
 --start takes size, model and start values of the cameras that it names from a file of cameras
 ({"name": camera, ...}, or one camera alone); --fix holds parameters there, and without a start the origin in the
 image centre and lens coefficients at 0. Parameters: fx fy cx cy, K (division), k1 k2 p1 p2 k3 (brown).
---poses: known X_WB of views (a linear stage, a robot); they are held and their frame is that of all poses. The board
-must then be parallel to itself and the stage's axes those of the table: what is not shows in the deviations.
+--poses: known X_WB of views (a linear stage, a robot); their frame is that of all poses, and the first one may be
+0 0 0 0 0 0, so that the board's first position is the frame of a stereo sensor. A board never sits exactly parallel
+to the stage that moves it. --stage check takes it so and says what the points say about that; --stage estimate finds
+the turn between the stage's axes and the board's (X_BS) together with the cameras: then only the first known view
+stands exactly where the table says, and the others along the stage's own axes. One direction of motion shows two
+turns, two directions three, motions with turns shifts as well. Two cameras that look from two sides tell the turn
+best; one camera with fx and fy free hardly does, which is said (--one-focal, --fix fx,fy with --start).
 Example: points.csv
   view, x_mm, y_mm, u_px, v_px
   1, 0, 0, 211.32, 145.90
@@ -50,7 +55,7 @@ unreadable input.)";
 struct ViewsOptions {
   std::string points;
   int width_px = 0, height_px = 0;
-  std::string model = "division";
+  std::string model = "division", stage = "check";
   std::optional<std::string> start, fix, report, poses;
   std::string output;
   bool one_focal = false, replace = false;
@@ -196,11 +201,24 @@ Json deviations_json(const CalibrationViews& input, const ViewsResult& result) {
   return deviations;
 }
 
+Json stage_json(const StageEstimate& stage) {
+  const bool known = stage.unknown.empty();
+  Json json{
+      {"axes", stage.held ? "held" : "estimated"}, {"reason", stage.unknown}, {"unknowns", stage.unknowns}};
+  json["X_BS"] = known ? Json(six_of(stage.X_BS)) : Json();
+  json["sigma"] = known ? pose_sigma_json(stage.covariance) : Json();
+  json["chance"] = stage.chance;
+  json["rms_px"] = stage.rms_px;
+  if (stage.held) json["answer_moves_sigmas"] = stage.answer_moves_sigmas;
+  return json;
+}
+
 Json json_of_result(const CalibrationViews& input, const ViewsResult& result, const char* pose) {
   Json json{{"status", name_of(result.status)}, {"reason", result.reason}};
   if (result.status != CalibrationStatus::ok) return json;
   add_cameras(json, input, result);
   json["views"] = views_json(input, result, pose);
+  if (result.stage) json["stage"] = stage_json(*result.stage);
   json["rms_px"] = result.rms_px;
   json["sigma_px"] = result.sigma_px;
   json["residual_sum"] = result.residual_sum;
@@ -226,6 +244,7 @@ std::string text_of_result(const CalibrationViews& input, const ViewsResult& res
   for (std::size_t v = 0; v < result.views.size(); ++v)
     text << table_of(six_of(result.views[v].X_WB)) << table_of({&result.views[v].rms_px, 1}) << "  "
          << input.views[v] << "\n";
+  if (result.stage) text << "the stage's axes: " << stage_text(*result.stage) << "\n";
   text << "rms " << result.rms_px << " px over all points used, " << result.rejected.size() << " of "
        << input.points.size() << " rejected\n";
   for (const std::string& warning : result.diagnosis.warnings) text << "warning: " << warning << "\n";
@@ -259,6 +278,8 @@ void add_known_poses(const std::string& file, std::vector<BoardView>& views) {
 }
 
 Answer calibrate_views_of(const ViewsOptions& options) {
+  if (options.stage == "estimate" && !options.poses)
+    throw std::invalid_argument("--stage estimate: how a stage moves the board must be known, give --poses");
   const CalibrationViews input = load_calibration_views(options.points);
   if (input.points.empty())
     return {
@@ -270,6 +291,7 @@ Answer calibrate_views_of(const ViewsOptions& options) {
   ViewsProblem problem;
   problem.cameras = cameras, problem.views = views, problem.points = input.points;
   problem.sigma_px = options.sigma_px, problem.reject_px = options.reject_px, problem.robust = options.robust;
+  problem.stage = options.stage == "estimate" ? StageAxes::estimate : StageAxes::check;
   if (input.points.size() > many_points)
     problem.progress = [&input](int iteration, double cost) {
       std::cerr << "step " << iteration << ": rms "
@@ -298,6 +320,9 @@ void add_options(cli::Verb verb, ViewsOptions& options) {
   verb.add_option(
       "--poses", options.poses,
       "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, known X_WB (stage, robot): the frame of all poses");
+  verb.add_option("--stage", options.stage,
+                  "with --poses, the stage's axes: check that they are the board's, or estimate them (check)")
+      .one_of({"check", "estimate"});
   verb.add_option("--fix", options.fix, "parameters to hold, parted by commas, e.g. p1,p2,k3");
   verb.add_flag("--one-focal", options.one_focal, "fx = fy");
   verb.add_option("--sigma-px", options.sigma_px, "of one pixel coordinate; without it from the residuals")
@@ -314,7 +339,7 @@ void add_options(cli::Verb verb, ViewsOptions& options) {
                   "the report as a page (SVG) to write; of a rig one per camera, PAGE-camera.svg");
   verb.add_flag("--json", options.json,
                 "one JSON object on stdout: status, reason, camera or cameras, sigma, correlation, views,\n"
-                "rms_px, sigma_px, deviations, rejected, diagnosis");
+                "stage, rms_px, sigma_px, deviations, rejected, diagnosis");
 }
 
 }  // namespace

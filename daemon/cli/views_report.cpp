@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "calib/words.h"
 #include "config/calibration_page.h"
 #include "config/text.h"
 
@@ -15,6 +16,15 @@ std::string step_text(const ViewsResult& result) {
 }
 
 }  // namespace
+
+std::string stage_text(const StageEstimate& stage) {
+  if (!stage.unknown.empty()) return concat({"taken for the board's: ", stage.unknown});
+  return concat(
+      {stage.held ? "taken for the board's; the points say turned by "
+                  : "estimated: turned against the board's by ",
+       turn_text(stage),
+       stage.held ? concat({" (so much or more by chance: ", number(100 * stage.chance, 1), " %)"}) : ""});
+}
 
 std::string page_of_camera(const CalibrationViews& input, const ViewsProblem& problem,
                            const ViewsResult& result, std::size_t camera, const std::string& source) {
@@ -36,6 +46,7 @@ std::string page_of_camera(const CalibrationViews& input, const ViewsProblem& pr
   own.rms_px = estimate.rms_px;
   own.diagnosis = result.diagnosis;
   own.steps = {{"views together", step_text(result), result.rms_px}};
+  if (result.stage) own.steps.push_back({"stage's axes", stage_text(*result.stage), result.stage->rms_px});
   CalibrationProblem part;
   part.points = points;
   part.width_px = problem.cameras[camera].width_px;

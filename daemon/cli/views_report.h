@@ -8,6 +8,9 @@
 
 namespace zeropose {
 
+// How the stage's axes lie against the board's and what the answer made of it.
+std::string stage_text(const StageEstimate& stage);
+
 // The page of one camera (config/calibration_page.h) from a result that is ok: its points in all views.
 std::string page_of_camera(const CalibrationViews& input, const ViewsProblem& problem,
                            const ViewsResult& result, std::size_t camera, const std::string& source);

@@ -22,10 +22,10 @@ std::vector<Vector3d> board(int count, double pitch_mm, double depth_mm) {
   return points;
 }
 
-ViewsScene scene_of(const std::vector<CameraModel>& models, const std::vector<Pose>& X_WC,
-                    const std::vector<Vector3d>& points, std::size_t views, double tilt_deg, Random& random) {
+ViewsScene scene_at(const std::vector<CameraModel>& models, const std::vector<Pose>& X_WC,
+                    const std::vector<Vector3d>& points, const std::vector<Pose>& X_WB) {
   ViewsScene scene;
-  scene.models = models, scene.X_WC = X_WC;
+  scene.models = models, scene.X_WC = X_WC, scene.X_WB = X_WB;
   for (std::size_t c = 0; c < models.size(); ++c) {
     ViewsCamera camera;
     camera.name = "camera" + std::to_string(c + 1);
@@ -34,24 +34,31 @@ ViewsScene scene_of(const std::vector<CameraModel>& models, const std::vector<Po
     camera.lens = brown ? LensModel::brown : LensModel::division;
     scene.cameras.push_back(camera);
   }
-  Vector3d middle = Vector3d::Zero();
-  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
-  for (std::size_t v = 0; v < views; ++v) {
-    const double rx = uniform(random, -tilt_deg, tilt_deg), ry = uniform(random, -tilt_deg, tilt_deg);
-    Pose X_WB = from_six_numbers({0, 0, 0, rx, ry, uniform(random, -180, 180)});
-    const Vector3d at(uniform(random, -100, 100), uniform(random, -80, 80), uniform(random, 700, 900));
-    X_WB.translation() = at - X_WB.linear() * middle;
-    scene.X_WB.push_back(X_WB);
+  for (std::size_t v = 0; v < X_WB.size(); ++v) {
     scene.views.push_back({std::to_string(v + 1), std::nullopt});
     for (std::size_t c = 0; c < models.size(); ++c)
       for (const Vector3d& p : points) {
         ViewPoint seen{v, c, {}};
         seen.point.p_W_mm = p;
-        seen.point.u_px = independent_pixel(models[c], X_WC[c].inverse() * X_WB * p);
+        seen.point.u_px = independent_pixel(models[c], X_WC[c].inverse() * X_WB[v] * p);
         scene.points.push_back(seen);
       }
   }
   return scene;
+}
+
+ViewsScene scene_of(const std::vector<CameraModel>& models, const std::vector<Pose>& X_WC,
+                    const std::vector<Vector3d>& points, std::size_t views, double tilt_deg, Random& random) {
+  Vector3d middle = Vector3d::Zero();
+  for (const Vector3d& p : points) middle += p / static_cast<double>(points.size());
+  std::vector<Pose> X_WB;
+  for (std::size_t v = 0; v < views; ++v) {
+    const double rx = uniform(random, -tilt_deg, tilt_deg), ry = uniform(random, -tilt_deg, tilt_deg);
+    X_WB.push_back(from_six_numbers({0, 0, 0, rx, ry, uniform(random, -180, 180)}));
+    const Vector3d at(uniform(random, -100, 100), uniform(random, -80, 80), uniform(random, 700, 900));
+    X_WB.back().translation() = at - X_WB.back().linear() * middle;
+  }
+  return scene_at(models, X_WC, points, X_WB);
 }
 
 void add_noise(ViewsScene& scene, double sigma_px, Random& random) {

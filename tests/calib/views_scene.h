@@ -33,6 +33,10 @@ Eigen::Vector2d independent_pixel(const CameraModel& camera, const Eigen::Vector
 // count x count points, pitch_mm apart, in z = 0, or with some depth: every point by up to depth_mm.
 std::vector<Eigen::Vector3d> board(int count, double pitch_mm, double depth_mm = 0);
 
+// Boards of `points` at X_WB, their poses unknown, seen by every camera.
+ViewsScene scene_at(const std::vector<CameraModel>& models, const std::vector<Pose>& X_WC,
+                    const std::vector<Eigen::Vector3d>& points, const std::vector<Pose>& X_WB);
+
 // Boards of `points` about 800 mm before the first camera, tilted by up to tilt_deg about both axes, seen by
 // every camera.
 ViewsScene scene_of(const std::vector<CameraModel>& models, const std::vector<Pose>& X_WC,

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """zeropose calibrate sensor through the real program: two ideal cameras of a sensor. Usage: sensor_test.py ZEROPOSE"""
 import json
+import math
 import sys
 import unittest
 
@@ -110,6 +111,47 @@ class Sensor(Case):
         self.expect_near(found["views"][2]["X_WB"], (0, 0, 120, 0, 0, 0), 1e-9)
         self.expect_refused(run(*views, "--poses", self.write("more.csv", poses + "9,0,0,0,0,0,0\n")), '"9"',
                             "has no points")
+
+    def turned_stage(self, turn_deg):
+        """Two cameras, 300 mm apart, without lens errors; the board moves along an axis turned about its y."""
+        rows, poses = "view,camera,x_mm,y_mm,u_px,v_px\n", "view,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n"
+        sine, cosine = math.sin(math.radians(turn_deg)), math.cos(math.radians(turn_deg))
+        for k, at in enumerate((0, 60, 120)):
+            poses += f"{k},0,0,{at},0,0,0\n"
+            for name, tilt in (("left", 15), ("right", -15)):
+                s, c = math.sin(math.radians(tilt)), math.cos(math.radians(tilt))
+                for x in range(-120, 121, 40):
+                    for y in range(-120, 121, 40):
+                        along, across = x + at * sine + 600 * s, at * cosine + 600 * c
+                        u, w = c * along - s * across, s * along + c * across
+                        rows += f"{k},{name},{x},{y},{500 + FOCAL * u / w},{400 + FOCAL * y / w}\n"
+        return ("calibrate", "views", "--points", self.write("v.csv", rows), "--poses", self.write("stage.csv", poses),
+                "--width", 1000, "--height", 800, "--sigma-px", 0.1, "--one-focal")
+
+    def test_a_stage_that_is_not_parallel_to_its_board(self):
+        views = self.turned_stage(0.3)
+        status, found, err = run_json(*views, "--stage", "estimate", "--report", self.path("page.svg"))
+        self.assertEqual((status, found["status"]), (0, "ok"), err)
+        self.assertEqual((found["stage"]["axes"], found["stage"]["unknowns"]), ("estimated", 2))
+        self.expect_near(found["stage"]["X_BS"], (0, 0, 0, 0, 0.3, 0), 1e-4)
+        self.assertGreater(found["stage"]["sigma"][4], 0)
+        self.assertEqual(found["stage"]["sigma"][5], 0)
+        self.assertAlmostEqual(found["cameras"]["left"]["fx"], FOCAL, 2)
+        self.assertAlmostEqual(found["views"][2]["X_WB"][0], 120 * math.sin(math.radians(0.3)), 4)
+        self.assertIn("ry 0.300", self.path("page-left.svg").read_text())
+        self.assertIn("the stage's axes: estimated: turned against the board's by", run(*views, "--stage", "estimate")[1])
+
+        status, held, err = run_json(*views)
+        self.assertEqual((status, held["stage"]["axes"]), (0, "held"), err)
+        self.assertAlmostEqual(held["stage"]["X_BS"][4], 0.3, 3)
+        self.assertGreater(held["rms_px"], 2 * held["stage"]["rms_px"])
+        self.assertTrue(any("axes seem turned" in warning for warning in held["diagnosis"]["warnings"]), held)
+        status, none, _ = run_json(*self.turned_stage(0))
+        self.assertFalse(any("stage" in warning for warning in none["diagnosis"]["warnings"]), none)
+
+    def test_a_stage_needs_known_poses(self):
+        views = self.turned_stage(0)
+        self.expect_refused(run(*views[:4], *views[6:], "--stage", "estimate"), "--stage estimate", "give --poses")
 
     def test_wrong_usage(self):
         self.stationary(PLACES)
