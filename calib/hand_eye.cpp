@@ -225,6 +225,16 @@ void warn(const HandEyeProblem& problem, const std::vector<SeenView>& seen, Hand
     result.warnings.push_back(swap);
 }
 
+// Of one coordinate, from the views' own poses; what their covariances say does not count here.
+double missed_px(std::span<const SeenView> views) {
+  double squares = 0, equations = 0;
+  for (const SeenView& view : views) {
+    squares += view.squares_px2;
+    equations += 2 * static_cast<double>(view.points.size()) - 6;
+  }
+  return equations > 0 ? std::sqrt(squares / equations) : 0;
+}
+
 void judge(const HandEyeProblem& problem, const WrongPoints& wrong, const std::vector<SeenView>& seen,
            HandEyeResult& result) {
   const bool plausible =
@@ -232,11 +242,11 @@ void judge(const HandEyeProblem& problem, const WrongPoints& wrong, const std::v
                            : result.robot_sigma_mm <= plausible_mm && result.robot_sigma_deg <= plausible_deg;
   const bool most_agree = max_removed_share * static_cast<double>(problem.views.size()) >=
                           static_cast<double>(result.removed.size());
-  const bool points_fit = problem.sigma_px > 0 || result.sigma_px <= plausible_px;
+  const bool points_fit = problem.sigma_px > 0 || missed_px(seen) <= plausible_px;
   if (wrong.agree && plausible && most_agree && points_fit && result.suspects.empty()) return;
   result.status = HandEyeStatus::contradiction;
   if (!points_fit) {
-    result.reason = "in the views the points miss their pixels by " + number(result.sigma_px) +
+    result.reason = "in the views the points miss their pixels by " + number(missed_px(seen)) +
                     " px: are these this camera's internals and this board's points?";
     return;
   }

@@ -29,6 +29,7 @@ struct SeenView {
   std::vector<bundle::SeenPoint> points;
   Matrix6 cofactor = Matrix6::Zero();  // covariance of X_CB for a sigma of 1 px
   double cost = 0;                     // of X_CB: whitened squares
+  double squares_px2 = 0;              // of X_CB: of the used points' deviations
 };
 
 // Of one component of moved(X_RH), and of a pixel.

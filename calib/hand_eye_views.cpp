@@ -72,6 +72,8 @@ std::optional<SeenView> look(const HandEyeProblem& problem, std::size_t view,
   seen.cofactor =
       equations->sums.block<6, 6>(internals_count, internals_count).ldlt().solve(Matrix6::Identity());
   seen.cost = equations->cost;
+  for (const auto& deviation : alone.deviations)
+    if (deviation.used) seen.squares_px2 += deviation.dev_px.squaredNorm();
   result.X_CB = seen.X_CB;
   result.points_used = seen.points.size();
   result.points_removed = alone.removed;

@@ -47,7 +47,20 @@ Seen seen(const BoardTarget& target, const ImageView& image) {
             board.equivalent_readings)};
   Seen seen;
   for (const BoardPoint& point : board.points)
-    seen.points.push_back({point.p_B_mm, point.u_px, point.covariance_px2});
+    seen.points.push_back({point.p_B_mm, point.u_px, point.covariance_px2, target.radius_mm});
+  return seen;
+}
+
+Seen seen(const BodyTarget& target, const ImageView& image) {
+  BodyProblem problem = target.problem;
+  problem.marks = target.marks;
+  const BodyResult body = find_body(image, problem);
+  if (body.status != BodyStatus::found) return {{}, "the body is not found: " + body.reason};
+  Seen seen;
+  for (const BodyPoint& point : body.points) {
+    const BodyMark& mark = target.marks[point.mark];
+    seen.points.push_back({mark.p_B_mm, point.u_px, point.covariance_px2, mark.radius_mm, point.normal_B});
+  }
   return seen;
 }
 

@@ -11,6 +11,7 @@
 
 #include "calib/rigid.h"
 #include "measure/board.h"
+#include "measure/body.h"
 #include "measure/code.h"
 #include "measure/marks.h"
 
@@ -24,11 +25,18 @@ struct BallTarget {
 // A board with one reading only: its frame must be the same in every picture.
 struct BoardTarget {
   BoardProblem problem;
+  double radius_mm = 0;  // of its circles; 0: unknown, or corners
+};
+
+// A calibration body; the marks of the problem are these.
+struct BodyTarget {
+  std::vector<BodyMark> marks;
+  BodyProblem problem;
 };
 
 struct SurveyOptions {
   std::size_t camera = 0;  // of the cell
-  std::variant<BallTarget, BoardTarget> target;
+  std::variant<BallTarget, BoardTarget, BodyTarget> target;
   int positions = 0;  // the robot counts them from 1
   // Where the hand shall go, X_RH of each position; empty: the robot's own program knows.
   std::vector<Pose> targets{};
@@ -39,6 +47,8 @@ struct SurveyPoint {
   Eigen::Vector3d p_B_mm = Eigen::Vector3d::Zero();  // in the target's frame; of a ball zero
   Eigen::Vector2d u_px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
+  double radius_mm = 0;  // of a flat round mark; 0: it is none, or its radius is not known
+  Eigen::Vector3d normal_B = -Eigen::Vector3d::UnitZ();
 };
 
 struct SurveyView {

@@ -35,20 +35,44 @@ BoardTarget board_target(const std::string& kind, const Json& target) {
   const auto found = std::ranges::find_if(kinds, [&](BoardKind one) { return kind == name_of(one); });
   if (found == kinds.end())
     throw std::invalid_argument("no target \"" + kind +
-                                "\"; there are ball, circles, asymmetric-circles, chessboard");
+                                "\"; there are ball, body, circles, asymmetric-circles, chessboard");
   problem.kind = *found;
   problem.rows = target.at("rows").get<int>();
   problem.cols = target.at("cols").get<int>();
   problem.pitch_mm = target.at("pitch_mm").get<double>();
-  return {problem};
+  return {problem, target.value("diameter_mm", 0.0) / 2};
+}
+
+Eigen::Vector3d vector(const Json& three) {
+  const auto numbers = three.get<std::array<double, 3>>();
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+// The internals that the cell believes are about right.
+BodyTarget body_target(const CameraModel& camera, const Json& marks) {
+  BodyTarget target;
+  for (const Json& mark : marks)
+    target.marks.push_back({mark.at("name").get<std::string>(), vector(mark.at("p_B_mm")),
+                            mark.at("radius_mm").get<double>(), vector(mark.at("normal_B"))});
+  target.problem.camera = camera;
+  return target;
 }
 
 Json point_json(const SurveyPoint& point) {
   const Eigen::Matrix2d& S = point.covariance_px2;
-  return {{"x_mm", point.p_B_mm.x()}, {"y_mm", point.p_B_mm.y()},
-          {"z_mm", point.p_B_mm.z()}, {"u_px", point.u_px.x()},
-          {"v_px", point.u_px.y()},   {"suu", S(0, 0)},
-          {"svv", S(1, 1)},           {"suv", S(0, 1)}};
+  const Eigen::Vector3d& n = point.normal_B;
+  return {{"x_mm", point.p_B_mm.x()},
+          {"y_mm", point.p_B_mm.y()},
+          {"z_mm", point.p_B_mm.z()},
+          {"u_px", point.u_px.x()},
+          {"v_px", point.u_px.y()},
+          {"suu", S(0, 0)},
+          {"svv", S(1, 1)},
+          {"suv", S(0, 1)},
+          {"radius_mm", point.radius_mm},
+          {"nx", n.x()},
+          {"ny", n.y()},
+          {"nz", n.z()}};
 }
 
 std::size_t driven_robot(const Cell& cell, const std::string& name) {
@@ -83,6 +107,8 @@ SurveyOptions survey_options(const Cell& cell, const Json& question) {
   const auto kind = target.at("kind").get<std::string>();
   if (kind == "ball")
     options.target = ball_target(target);
+  else if (kind == "body")
+    options.target = body_target(cell.calibration.at(options.camera).model, target.at("marks"));
   else
     options.target = board_target(kind, target);
   if (!question.contains("targets")) return options;

@@ -72,8 +72,8 @@ DriveOptions drive_options(const Options& options) {
 SurveyDrive survey_of(const Options& options) {
   const std::filesystem::path truth = sim_file_of(options.cell);
   for (const SurveyDrive& survey : load_sim_file(truth).surveys)
-    if (survey.camera == options.survey) return survey;
-  throw std::invalid_argument(truth.string() + " has no survey for camera " + options.survey);
+    if (survey.name == options.survey) return survey;
+  throw std::invalid_argument(truth.string() + " has no survey " + options.survey);
 }
 
 int run(const Options& options) {
@@ -89,14 +89,15 @@ int run(const Options& options) {
                     [&simulated](const std::string& line) { return answer_cell_control(simulated, line); });
   std::fprintf(stderr, "zeropose-cell: serving %zu cameras of cell %s\n", cell.cameras.size(),
                cell.name.c_str());
+  const auto move_hand = [&simulated](std::size_t robot, const Pose& X_RH) {
+    simulated.move_hand(robot, X_RH);
+  };
   if (!options.survey.empty())
-    return drive_survey(
-        cell, survey_of(options), [&simulated](const CarriedBall& ball) { simulated.show_ball(ball); },
-        signals.stopped());
+    return drive_survey(cell, survey_of(options),
+                        {[&simulated](const Carried& target) { simulated.show_target(target); }, move_hand},
+                        signals.stopped());
   if (options.drives)
-    return drive(cell, X_WO_nominal,
-                 {[&simulated](const Pose& X_WO) { simulated.show(X_WO); },
-                  [&simulated](std::size_t robot, const Pose& X_RH) { simulated.move_hand(robot, X_RH); }},
+    return drive(cell, X_WO_nominal, {[&simulated](const Pose& X_WO) { simulated.show(X_WO); }, move_hand},
                  drive_options(options), signals.stopped());
   signals.stopped().wait(false);
   return 0;
@@ -110,7 +111,8 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--fault", options.faults,
                  "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK,\n"
                  "camera-moved:CAMERA");
-  app.add_option("--survey", options.survey, "run the robot's program of the ball grid for this camera");
+  app.add_option("--survey", options.survey,
+                 "run the robot's program of this survey of the truth file: a camera's name, or its own");
   app.add_option("--control", options.control, "Unix socket that moves the object and injects faults");
   auto* drives =
       app.add_flag("--drive", options.drives,

@@ -1,7 +1,5 @@
 #include "sim/renderer.h"
 
-#include "sim/ball_plate_look.h"
-
 namespace zeropose {
 
 CameraRenderer::CameraRenderer(const Scene& scene, std::size_t camera)
@@ -13,7 +11,7 @@ CameraRenderer::CameraRenderer(const Scene& scene, std::size_t camera)
       blur_sigma_px_(scene.picture.blur_sigma_px) {}
 
 std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults& faults,
-                                                 const std::optional<CarriedBall>& ball) const {
+                                                 const std::optional<Carried>& carried) const {
   const auto moved = faults.moved_cameras.find(name_);
   const Pose X_CnCo = moved == faults.moved_cameras.end() ? Pose::Identity() : moved->second.inverse();
   const Pose X_CW = X_CnCo * X_CW_;
@@ -21,7 +19,7 @@ std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults&
   Canvas canvas(rays_, blur_sigma_px_, 0);
   look_->paint(canvas, moment);
   for (const MarkPlate& plate : references_) paint_plate(canvas, plate, X_CW, moment);
-  if (ball) paint_ball(canvas, X_CW * ball->p_W_mm, ball->radius_mm, ball->grey);
+  if (carried) paint_carried(canvas, *carried, X_CW);
   canvas.illuminate(look_->light());
   return std::move(canvas).picture();
 }

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "sim/carried.h"
 #include "sim/look.h"
 #include "sim/mark_plates.h"
 #include "sim/painter.h"
@@ -24,7 +25,7 @@ class CameraRenderer {
   // Grey levels, row by row, with blur and without noise, not clamped. The same pose and faults give the same
   // picture bit by bit. May be called from several threads.
   std::vector<float> clean_picture(const Pose& X_WO, const Faults& faults = {},
-                                   const std::optional<CarriedBall>& ball = std::nullopt) const;
+                                   const std::optional<Carried>& carried = std::nullopt) const;
 
  private:
   PixelRays rays_;

@@ -79,12 +79,6 @@ struct Faults {
   std::map<std::string, Pose> moved_cameras{};  // X_CoCn by the camera's name
 };
 
-// A ball that a robot carries before the cameras.
-struct CarriedBall {
-  Eigen::Vector3d p_W_mm = Eigen::Vector3d::Zero();
-  double radius_mm = 0, grey = 0;
-};
-
 // The scene of the cell's first job with the truth of the file CELL.sim.json. Throws ConfigError: names file
 // and key path of every mistake, also cameras that only one of both knows.
 Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file);

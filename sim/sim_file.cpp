@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "calib/robot_poses.h"
+#include "config/body_tables.h"
 #include "config/cameras.h"
 #include "config/files.h"
 #include "config/json_reader.h"
@@ -72,15 +74,68 @@ RobotErrors read_errors(JsonObject& object) {
   return errors;
 }
 
-SurveyDrive read_survey(JsonObject& object) {
+BallInHand read_ball(JsonObject& object, SurveyDrive& survey) {
+  BallInHand ball;
+  Pose X_RH_first = Pose::Identity();
+  Eigen::Vector3d step_mm = Eigen::Vector3d::Zero();
+  bool along_hand = false;
+  object.read("ball_in_hand_mm", ball.p_HT_mm, 1e4);
+  object.read("radius_mm", ball.radius_mm, NumberRange{0, 1000, true});
+  object.read("grey", ball.grey, NumberRange{0, 255});
+  object.read("first_hand_pose", X_RH_first);
+  object.read("step_mm", step_mm, 1e4);
+  object.read_optional("along_hand", along_hand);
+  survey.places = ball_grid(X_RH_first, step_mm, along_hand);
+  return ball;
+}
+
+std::vector<PrintedMark> read_board(JsonObject& object) {
+  int rows = 0, cols = 0;
+  double pitch_mm = 0, diameter_mm = 0;
+  object.read("rows", rows, 2, 100);
+  object.read("cols", cols, 2, 100);
+  object.read("pitch_mm", pitch_mm, NumberRange{0, 1000, true});
+  object.read("diameter_mm", diameter_mm, NumberRange{0, 1000, true});
+  return printed_board(rows, cols, pitch_mm, diameter_mm);
+}
+
+std::vector<PrintedMark> printed_marks(const std::filesystem::path& file) {
+  std::vector<PrintedMark> marks;
+  for (const BodyMark& mark : load_body(file)) {
+    if (!(mark.radius_mm > 0) || mark.normal_B.isZero())
+      throw ConfigError({file.string() + ", mark " + mark.name +
+                         ": found no radius or no normal, expected radius_mm nx ny nz to draw it"});
+    marks.push_back({mark.p_B_mm, mark.radius_mm, mark.normal_B.normalized()});
+  }
+  return marks;
+}
+
+ShownBody read_body(JsonObject& object, const std::filesystem::path& folder, SurveyDrive& survey) {
+  ShownBody body;
+  std::string file;
+  object.read_optional("board", [&](JsonObject& board) { body.marks = read_board(board); });
+  if (object.read_optional("body", file)) body.marks = printed_marks(folder / file);
+  Pose X_HB = Pose::Identity();
+  if (object.read_optional("in_hand", X_HB))
+    body.X_HB = X_HB;
+  else
+    object.read("in_world", body.X_WB);
+  object.read_each("hand_poses", 3, [&](JsonObject& pose) {
+    Pose X_RH = Pose::Identity();
+    if (pose.read("X_RH", X_RH)) survey.places.push_back(X_RH);
+  });
+  return body;
+}
+
+SurveyDrive read_survey(JsonObject& object, const std::filesystem::path& folder) {
   SurveyDrive survey;
   object.read("camera", survey.camera);
-  object.read("ball_in_hand_mm", survey.p_HT_mm, 1e4);
-  object.read("radius_mm", survey.radius_mm, NumberRange{0, 1000, true});
-  object.read("grey", survey.grey, NumberRange{0, 255});
-  object.read("first_hand_pose", survey.X_RH_first);
-  object.read("step_mm", survey.step_mm, 1e4);
-  object.read_optional("along_hand", survey.along_hand);
+  survey.name = survey.camera;
+  object.read_optional("name", survey.name);
+  if (object.has("board") || object.has("body"))
+    survey.target = read_body(object, folder, survey);
+  else
+    survey.target = read_ball(object, survey);
   object.read_optional("robot", [&](JsonObject& robot) { survey.errors = read_errors(robot); });
   return survey;
 }
@@ -111,8 +166,9 @@ SimFile load_sim_file(const std::filesystem::path& path) {
     top.read("cameras", [&](JsonObject& cameras) { file.cameras = read_cameras(cameras); });
     top.read_optional("object", [&](JsonObject& object) { file.object = read_object_truth(object); });
     top.read_optional("drive", [&](JsonObject& drive) { file.drive = read_drive(drive); });
-    top.read_each_optional("surveys",
-                           [&](JsonObject& survey) { file.surveys.push_back(read_survey(survey)); });
+    top.read_each_optional("surveys", [&](JsonObject& survey) {
+      file.surveys.push_back(read_survey(survey, path.parent_path()));
+    });
     top.read("picture", [&](JsonObject& picture) { file.picture = read_picture(picture); });
   });
   reading.throw_if_wrong();

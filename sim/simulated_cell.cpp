@@ -33,11 +33,11 @@ CellPictures::CellPictures(const Scene& scene)
   show(scene.X_WO_nominal, {});
 }
 
-void CellPictures::show(const Pose& X_WO, const Faults& faults, const std::optional<CarriedBall>& ball) {
+void CellPictures::show(const Pose& X_WO, const Faults& faults, const std::optional<Carried>& carried) {
   std::vector<std::future<Clean>> under_way;
   for (const CameraRenderer& renderer : renderers_)
     under_way.push_back(
-        std::async(std::launch::async, [&] { return renderer.clean_picture(X_WO, faults, ball); }));
+        std::async(std::launch::async, [&] { return renderer.clean_picture(X_WO, faults, carried); }));
   std::vector<std::shared_ptr<const Clean>> fresh;
   for (auto& picture : under_way) fresh.push_back(std::make_shared<const Clean>(picture.get()));
   const std::lock_guard lock(mutex_);
@@ -78,11 +78,11 @@ GigeServer& SimulatedCell::gige(const char* fault) {
 // A camera on a hand that was moved has moved in the hand.
 void SimulatedCell::render() {
   Faults now = faults_;
-  for (const auto& [camera, X_CoCn] : carried_) {
+  for (const auto& [camera, X_CoCn] : carried_cameras_) {
     const auto moved = faults_.moved_cameras.find(camera);
     now.moved_cameras[camera] = moved == faults_.moved_cameras.end() ? X_CoCn : X_CoCn * moved->second;
   }
-  pictures_.show(X_WO_, now, ball_);
+  pictures_.show(X_WO_, now, target_);
   if (gige_) gige_->picture_changed();
   if (v4l2_) v4l2_->picture_changed();
 }
@@ -90,7 +90,7 @@ void SimulatedCell::render() {
 void SimulatedCell::show(const Pose& X_WO) {
   const std::lock_guard lock(mutex_);
   X_WO_ = X_WO;
-  ball_.reset();
+  target_.reset();
   render();
 }
 
@@ -99,16 +99,16 @@ void SimulatedCell::move_hand(std::size_t robot, const Pose& X_RH) {
   for (const HandCamera& hand : scene_.hand_cameras) {
     if (hand.robot != robot) continue;
     const CalibratedCamera& camera = scene_.cameras[hand.camera];
-    carried_[camera.name] = camera.X_WC.inverse() * hand.X_WR * X_RH * hand.X_HC;
+    carried_cameras_[camera.name] = camera.X_WC.inverse() * hand.X_WR * X_RH * hand.X_HC;
   }
   render();
 }
 
-void SimulatedCell::show_ball(const CarriedBall& ball) {
+void SimulatedCell::show_target(const Carried& target) {
   constexpr double out_of_sight_mm = 1e6;
   const std::lock_guard lock(mutex_);
   X_WO_.translation().x() = out_of_sight_mm;
-  ball_ = ball;
+  target_ = target;
   render();
 }
 

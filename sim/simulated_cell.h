@@ -22,7 +22,7 @@ class CellPictures {
   explicit CellPictures(const Scene& scene);  // shows the object at its nominal pose
 
   // Renders all cameras side by side.
-  void show(const Pose& X_WO, const Faults& faults, const std::optional<CarriedBall>& ball = std::nullopt);
+  void show(const Pose& X_WO, const Faults& faults, const std::optional<Carried>& carried = std::nullopt);
   // The frame that a camera takes now, from pixel `first` on; the noise of every call is new. One thread for
   // each camera at a time.
   void draw(std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first = 0);
@@ -48,8 +48,8 @@ class SimulatedCell {
   void show(const Pose& X_WO);
   // Moves a robot's hand, and the cameras that it carries, to where it truly is.
   void move_hand(std::size_t robot, const Pose& X_RH);
-  // Takes the object away and shows a ball instead.
-  void show_ball(const CarriedBall& ball);
+  // Takes the object away and shows a target of a calibration instead.
+  void show_target(const Carried& target);
   Pose pose() const;
   Faults faults() const;
   const Scene& scene() const { return scene_; }
@@ -73,8 +73,9 @@ class SimulatedCell {
   mutable std::mutex mutex_;
   Pose X_WO_;
   Faults faults_;
-  std::optional<CarriedBall> ball_;
-  std::map<std::string, Pose> carried_;  // X_CoCn of the cameras on hands, from where they are in the scene
+  std::optional<Carried> target_;  // of a calibration
+  std::map<std::string, Pose>
+      carried_cameras_;  // X_CoCn of the cameras on hands, from where they are in the scene
   CellPictures pictures_;
   std::unique_ptr<GigeServer> gige_;  // one of the two
   std::unique_ptr<V4l2Server> v4l2_;

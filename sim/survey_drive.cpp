@@ -1,8 +1,8 @@
 #include "sim/survey_drive.h"
 
+#include <algorithm>
 #include <cstdio>
 
-#include "calib/robot_poses.h"
 #include "measure/code.h"
 #include "sim/drive.h"
 #include "sim/robot.h"
@@ -12,46 +12,58 @@ namespace {
 
 constexpr double begins_within_s = 60;
 constexpr int tries = 3;
-// The robot's own space: no target is farther from its first position than its own grid reaches, and this.
+// The robot's own space: no target is farther from its first place than its own others are, and this.
 constexpr double room_mm = 50;
 
-class BallCarrier {
+Carried carried_by(const BallInHand& ball, const Pose& X_WH) {
+  return CarriedBall{X_WH * ball.p_HT_mm, ball.radius_mm, ball.grey};
+}
+Carried carried_by(const ShownBody& body, const Pose& X_WH) {
+  return CarriedBody{body.X_HB ? Pose(X_WH * *body.X_HB) : body.X_WB, body.marks};
+}
+
+class Surveyor {
  public:
-  BallCarrier(const Cell& cell, const SurveyDrive& survey,
-              const std::function<void(const CarriedBall&)>& show)
+  Surveyor(const Cell& cell, const SurveyDrive& survey, const SurveyedCell& surveyed)
       : cell_(cell),
         survey_(survey),
-        show_(show),
-        grid_(ball_grid(survey.X_RH_first, survey.step_mm, survey.along_hand)),
+        surveyed_(surveyed),
         robot_(robot_options(cell, survey.robot)),
-        errors_(survey.errors, grid_.size(), 1) {}
+        errors_(survey.errors, survey.places.size(), 1) {}
 
-  std::size_t size() const { return grid_.size(); }
+  std::size_t size() const { return survey_.places.size(); }
   std::optional<HandTarget> target() { return robot_.target(); }
 
-  RobotAnswer go(std::size_t position) { return go(position, grid_.at(position)); }
+  RobotAnswer go(std::size_t position) { return go(position, survey_.places.at(position)); }
   RobotAnswer go(const HandTarget& target) {
-    const double way_mm = (target.X_RH.translation() - grid_.front().translation()).norm();
-    const double reach_mm = (grid_.back().translation() - grid_.front().translation()).norm() + room_mm;
-    if (way_mm <= reach_mm && target.index <= grid_.size()) return go(target.index - 1, target.X_RH);
+    if (target.index <= size() && way_mm(target.X_RH) <= reach_mm()) return go(target.index - 1, target.X_RH);
     RobotAnswer answer;
     answer.refusal = "target " + std::to_string(target.index) + " is outside the robot's own space";
     return answer;
   }
 
  private:
+  double way_mm(const Pose& X_RH) const {
+    return (X_RH.translation() - survey_.places.front().translation()).norm();
+  }
+  double reach_mm() const {
+    double reach_mm = 0;
+    for (const Pose& X_RH : survey_.places) reach_mm = std::max(reach_mm, way_mm(X_RH));
+    return reach_mm + room_mm;
+  }
+
   RobotAnswer go(std::size_t position, const Pose& X_RH) {
     const Pose X_RH_true = errors_.true_hand(position, X_RH);
-    const Pose& X_WR = cell_.robots.at(survey_.robot).X_WR;
-    show_({X_WR * X_RH_true * survey_.p_HT_mm, survey_.radius_mm, survey_.grey});
+    const Pose X_WH = cell_.robots.at(survey_.robot).X_WR * X_RH_true;
+    surveyed_.move_hand(survey_.robot, X_RH_true);
+    surveyed_.show(std::visit([&](const auto& target) { return carried_by(target, X_WH); }, survey_.target));
     return robot_.at_position(static_cast<std::uint16_t>(cell_.jobs.front().number), 0,
                               static_cast<std::int32_t>(position + 1), X_RH);
   }
 
   const Cell& cell_;
   const SurveyDrive& survey_;
-  const std::function<void(const CarriedBall&)>& show_;
-  const std::vector<Pose> grid_;
+  const SurveyedCell& surveyed_;
   SimulatedRobot robot_;
   HandErrors errors_;
 };
@@ -61,12 +73,12 @@ void tell(std::size_t position, const RobotAnswer& answer) {
   std::fflush(stdout);
 }
 
-// How many positions of its own grid were taken.
-std::size_t through_grid(BallCarrier& carrier, const std::atomic<bool>& stop) {
+// How many of its own places were taken.
+std::size_t through_places(Surveyor& surveyor, const std::atomic<bool>& stop) {
   std::size_t taken = 0;
-  for (std::size_t position = 0; position < carrier.size() && !stop; ++position) {
+  for (std::size_t position = 0; position < surveyor.size() && !stop; ++position) {
     RobotAnswer answer;
-    for (int attempt = 0; attempt < tries && !answer.ok(); ++attempt) answer = carrier.go(position);
+    for (int attempt = 0; attempt < tries && !answer.ok(); ++attempt) answer = surveyor.go(position);
     taken += answer.ok() ? 1 : 0;
     tell(position + 1, answer);
   }
@@ -75,12 +87,12 @@ std::size_t through_grid(BallCarrier& carrier, const std::atomic<bool>& stop) {
 
 // The daemon shows one target after the other until it has them all; a target outside the robot's space ends
 // it.
-std::size_t through_targets(BallCarrier& carrier, const std::atomic<bool>& stop) {
+std::size_t through_targets(Surveyor& surveyor, const std::atomic<bool>& stop) {
   std::size_t taken = 0;
-  for (std::size_t go = 0; go < tries * carrier.size() && !stop; ++go) {
-    const std::optional<HandTarget> target = carrier.target();
+  for (std::size_t go = 0; go < tries * surveyor.size() && !stop; ++go) {
+    const std::optional<HandTarget> target = surveyor.target();
     if (!target) break;
-    const RobotAnswer answer = carrier.go(*target);
+    const RobotAnswer answer = surveyor.go(*target);
     taken += answer.ok() ? 1 : 0;
     tell(target->index, answer);
     if (answer.request_id == 0) break;
@@ -90,15 +102,15 @@ std::size_t through_targets(BallCarrier& carrier, const std::atomic<bool>& stop)
 
 }  // namespace
 
-int drive_survey(const Cell& cell, const SurveyDrive& survey,
-                 const std::function<void(const CarriedBall&)>& show, const std::atomic<bool>& stop) {
-  BallCarrier carrier(cell, survey, show);
+int drive_survey(const Cell& cell, const SurveyDrive& survey, const SurveyedCell& surveyed,
+                 const std::atomic<bool>& stop) {
+  Surveyor surveyor(cell, survey, surveyed);
   bool told = false;
   // Somebody looks at the positions, whatever he sees.
   const auto begun = [&] {
-    told = carrier.target().has_value();
+    told = surveyor.target().has_value();
     if (told) return true;
-    const RobotAnswer answer = carrier.go(0);
+    const RobotAnswer answer = surveyor.go(0);
     return answer.ok() || answer.code == static_cast<std::uint16_t>(Code::not_standing_still) ||
            answer.code == static_cast<std::uint16_t>(Code::too_few_marks);
   };
@@ -106,9 +118,9 @@ int drive_survey(const Cell& cell, const SurveyDrive& survey,
     std::fprintf(stderr, "the robot waited %.0f s for a survey\n", begins_within_s);
     return 1;
   }
-  const std::size_t taken = told ? through_targets(carrier, stop) : through_grid(carrier, stop);
-  std::printf("%zu of %zu positions taken\n", taken, carrier.size());
-  return taken == carrier.size() ? 0 : 1;
+  const std::size_t taken = told ? through_targets(surveyor, stop) : through_places(surveyor, stop);
+  std::printf("%zu of %zu positions taken\n", taken, surveyor.size());
+  return taken == surveyor.size() ? 0 : 1;
 }
 
 }  // namespace zeropose

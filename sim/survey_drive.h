@@ -1,34 +1,52 @@
-// The robot program of a ball grid (spec 40 P2): a robot carries a ball to 3 x 3 x 3 positions before one
-// camera, says where its hand is, and tells a position again that was not taken. Where the daemon's survey
-// has targets of its own it goes to those, inside its own space only.
+// The robot program of a calibration (spec 40 P1 to P3): a robot shows a target to one camera, or its hand's
+// camera a target, from several positions, says where its hand is, and tells a position again that was not
+// taken.
 #pragma once
 
 #include <atomic>
 #include <functional>
+#include <optional>
 #include <string>
+#include <variant>
+#include <vector>
 
 #include "config/cell.h"
+#include "sim/carried.h"
 #include "sim/hand_errors.h"
-#include "sim/scene.h"
 
 namespace zeropose {
 
-// From the truth file of a cell. The ball's centre is fixed in the hand, whose first position is X_RH_first;
-// the others follow along the axes of the robot's base or of the hand.
-struct SurveyDrive {
-  std::string camera;     // that the grid is for
-  std::size_t robot = 0;  // of the cell
-  Eigen::Vector3d p_HT_mm = Eigen::Vector3d::Zero();
+struct BallInHand {
+  Eigen::Vector3d p_HT_mm = Eigen::Vector3d::Zero();  // its centre
   double radius_mm = 0, grey = 0;
-  Pose X_RH_first = Pose::Identity();
-  Eigen::Vector3d step_mm = Eigen::Vector3d::Zero();
-  bool along_hand = false;
+};
+
+// A board or body on the hand; without X_HB it stands still and the hand carries the camera.
+struct ShownBody {
+  std::vector<PrintedMark> marks;
+  std::optional<Pose> X_HB;
+  Pose X_WB = Pose::Identity();
+};
+
+// From the truth file of a cell.
+struct SurveyDrive {
+  std::string name;       // that of the camera, where it has no other
+  std::string camera;     // that it is for
+  std::size_t robot = 0;  // of the cell
+  std::variant<BallInHand, ShownBody> target;
+  std::vector<Pose> places;  // X_RH of the robot's own program
   RobotErrors errors;
 };
 
-// Goes where the daemon's survey says, or through its own grid where that says nothing. Returns the exit
-// status: 0 when every position was taken. Waits for the survey to begin.
-int drive_survey(const Cell& cell, const SurveyDrive& survey,
-                 const std::function<void(const CarriedBall&)>& show, const std::atomic<bool>& stop);
+// What the robot moves; both return when every camera shows it so.
+struct SurveyedCell {
+  std::function<void(const Carried& target)> show;
+  std::function<void(std::size_t robot, const Pose& X_RH)> move_hand;  // what a robot carries
+};
+
+// Goes where the daemon's survey says, inside the robot's own space only, or through its own places where
+// that says nothing. Returns the exit status: 0 when every position was taken. Waits for the survey to begin.
+int drive_survey(const Cell& cell, const SurveyDrive& survey, const SurveyedCell& surveyed,
+                 const std::atomic<bool>& stop);
 
 }  // namespace zeropose

@@ -7,6 +7,7 @@
 
 #include "calib/robot_poses.h"
 #include "config/atomic_file.h"
+#include "config/body_tables.h"
 #include "config/config_error.h"
 #include "config/robot_tables.h"
 #include "config/text.h"
@@ -33,8 +34,12 @@ is lost: what was gathered when the time is up is written too.
   --target ball      one ball anywhere in the picture: ball grids. Then: zeropose calibrate ball
   --target circles, asymmetric-circles, chessboard
                      a board of --rows --cols --pitch-mm: hand-eye. Then: zeropose calibrate hand-eye. It must look
-                     different from every side: asymmetric circles with an odd number of rows
-Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards also x_mm y_mm z_mm).
+                     different from every side: asymmetric circles with an odd number of rows. --diameter-mm of its
+                     circles lets the calibrations correct that the centre of an image is not the image of a centre
+  --target body      a calibration body, --body table.csv (zeropose find-body --help): hand-eye without a laser tracker,
+                     and from one position with control marks its points for calibrate points
+Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards and bodies also x_mm
+y_mm z_mm, and with a radius radius_mm nx ny nz).
 The robot's own program knows the positions; or, with --drive ROBOT, the daemon tells it where to go, one position
 after the other (target block, docs/modbus.md): --targets file.csv (view x_mm .. rz_deg: X_RH), or a grid of 3 x 3 x 3
 from --first in steps of --step along the base's axes, or with --along-hand the hand's. The robot moves only inside its
@@ -48,12 +53,13 @@ Exit status: 0 all positions, 1 the time was up before (the files hold what ther
 
 struct Options {
   std::string socket = default_control_socket().string();
-  std::string camera, target = "ball", robot, points;
+  std::string camera, target = "ball", body, robot, points;
   std::string drive, targets;
   std::optional<std::string> first, step;
   bool along_hand = false;
   int positions = 0, rows = 0, cols = 0;
-  double min_diameter_px = 0, max_diameter_px = 0, pitch_mm = 0, patience_s = 600;
+  double min_diameter_px = 0, max_diameter_px = 0, pitch_mm = 0, diameter_mm = 0, patience_s = 600;
+  double radius_mm = 0;
   bool bright = false, replace = false, json = false;
 };
 
@@ -63,16 +69,28 @@ Json ask_daemon(const Options& options, const Json& question) {
   return answer;
 }
 
+Json marks_of(const Options& options) {
+  Json marks = Json::array();
+  for (const BodyMark& mark : load_body(options.body))
+    marks.push_back({{"name", mark.name},
+                     {"p_B_mm", json_of(mark.p_B_mm)},
+                     {"radius_mm", mark.radius_mm > 0 ? mark.radius_mm : options.radius_mm},
+                     {"normal_B", json_of(mark.normal_B)}});
+  return marks;
+}
+
 Json target_of(const Options& options) {
   if (options.target == "ball")
     return {{"kind", "ball"},
             {"bright", options.bright},
             {"min_diameter_px", options.min_diameter_px},
             {"max_diameter_px", options.max_diameter_px}};
+  if (options.target == "body") return {{"kind", "body"}, {"marks", marks_of(options)}};
   return {{"kind", options.target},
           {"rows", options.rows},
           {"cols", options.cols},
-          {"pitch_mm", options.pitch_mm}};
+          {"pitch_mm", options.pitch_mm},
+          {"diameter_mm", options.diameter_mm}};
 }
 
 // What is new goes to stderr, so that whoever stands at the robot sees it.
@@ -94,6 +112,11 @@ void refuse_contradictions(const Options& options) {
     if (!(options.min_diameter_px > 0 && options.max_diameter_px > options.min_diameter_px))
       throw std::invalid_argument(
           "--target ball: expected --min-diameter-px above 0 and a larger --max-diameter-px");
+    return;
+  }
+  if (options.target == "body") {
+    if (options.body.empty())
+      throw std::invalid_argument("--target body: expected --body, the table of its marks");
     return;
   }
   if (options.rows < 2 || options.cols < 2 || !(options.pitch_mm > 0))
@@ -158,9 +181,17 @@ std::string robot_table(const Json& views) {
   return text.str();
 }
 
+bool has_radii(const Json& views) {
+  for (const Json& view : views)
+    for (const Json& point : view["points"])
+      if (!(point["radius_mm"].get<double>() > 0)) return false;
+  return true;
+}
+
 std::string points_table(const Json& views, bool ball) {
   std::vector<std::string> columns{"u_px", "v_px", "suu", "svv", "suv"};
   if (!ball) columns.insert(columns.begin(), {"x_mm", "y_mm", "z_mm"});
+  if (!ball && has_radii(views)) columns.insert(columns.end(), {"radius_mm", "nx", "ny", "nz"});
   std::ostringstream text;
   text << "view" << std::setprecision(10);
   for (const std::string& column : columns) text << ',' << column;
@@ -230,13 +261,16 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   verb.add_flag("--along-hand", options->along_hand, "the steps run along the axes of the hand");
   verb.add_option("--target", options->target, "what is looked for")
       .shows_default()
-      .one_of({"ball", "circles", "asymmetric-circles", "chessboard"});
+      .one_of({"ball", "body", "circles", "asymmetric-circles", "chessboard"});
   verb.add_flag("--bright", options->bright, "the ball is brighter than what surrounds it");
   verb.add_option("--min-diameter-px", options->min_diameter_px, "of the ball's image");
   verb.add_option("--max-diameter-px", options->max_diameter_px, "of the ball's image");
   verb.add_option("--rows", options->rows, "of a board");
   verb.add_option("--cols", options->cols, "of a board");
   verb.add_option("--pitch-mm", options->pitch_mm, "of a board");
+  verb.add_option("--diameter-mm", options->diameter_mm, "of a board's circles");
+  verb.add_option("--body", options->body, "CSV of a body: mark x_mm y_mm z_mm [radius_mm nx ny nz]");
+  verb.add_option("--radius-mm", options->radius_mm, "of the body's marks where the table does not say");
   verb.add_option("--robot", options->robot, "the CSV of the hand's poses to write").required();
   verb.add_option("--points", options->points, "the CSV of the pixels to write").required();
   verb.add_flag("--replace", options->replace, "overwrite these two");

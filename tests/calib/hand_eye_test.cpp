@@ -319,6 +319,20 @@ TEST(HandEye, AnotherCamerasInternalsAreRefused) {
   }
 }
 
+// How far points miss their pixels is counted in px, whatever their covariances say.
+TEST(HandEye, PixelsThatAreFarMoreCertainThanTheyAreGoodAreNoOtherCamera) {
+  Random random(16);
+  for (const HandEyeSetup setup : setups) {
+    const RobotScene scene = robot_scene(setup, 10, 30, random);
+    auto views = scene.views(usual, random);
+    for (HandEyeView& view : views)
+      for (CalibrationPoint& point : view.points) point.covariance_px2 *= 1e-4;
+    const HandEyeResult result = calibrate_hand_eye(scene.problem(views));
+    EXPECT_EQ(result.status, HandEyeStatus::ok) << result.reason;
+    EXPECT_GT(result.sigma_px, 1);
+  }
+}
+
 TEST(HandEye, DiscsAreFreeOfTheirEccentricity) {
   Random random(14);
   const RobotScene scene = robot_scene(HandEyeSetup::eye_to_hand, 6, 35, random);

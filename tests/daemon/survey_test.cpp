@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/support/board_picture.h"
+#include "tests/support/body_scene.h"
 
 namespace zeropose {
 namespace {
@@ -56,6 +57,26 @@ TEST_F(BallSurvey, KeepsWhereTheBallIsWithWhereTheHandWas) {
   ASSERT_EQ(view.points.size(), 1u);
   EXPECT_LT((view.points[0].u_px - Vector2d(120.3, 80.6)).norm(), 0.1);
   EXPECT_THAT(survey.missing(), ElementsAre(1, 3));
+}
+
+TEST_F(BallSurvey, GoesOnWithTheNextThatIsMissingAndThenFromTheStart) {
+  EXPECT_EQ(survey.next_after(0), 1);
+  look(1, {100, 100});
+  EXPECT_EQ(survey.next_after(1), 2);
+  look_at(2, {}, {});
+  EXPECT_EQ(survey.next_after(2), 3);
+  look(3, {100, 100});
+  EXPECT_EQ(survey.next_after(3), 2);
+  look(2, {100, 100});
+  EXPECT_EQ(survey.next_after(2), 0);
+}
+
+TEST_F(BallSurvey, HasATargetForEveryPositionOrNone) {
+  SurveyOptions few = options();
+  few.targets = {Pose::Identity(), Pose::Identity()};
+  EXPECT_THROW(Survey{few}, std::invalid_argument);
+  few.targets.push_back(Pose::Identity());
+  EXPECT_NO_THROW(Survey{few});
 }
 
 TEST_F(BallSurvey, TheLastWordCounts) {
@@ -133,6 +154,39 @@ TEST(BoardSurvey, RefusesABoardWhoseFrameMayTurn) {
   const SurveyVerdict verdict = look_at(scene, survey);
   EXPECT_EQ(verdict.code, Code::too_few_marks);
   EXPECT_THAT(verdict.reason, HasSubstr("the board looks the same from 2 sides"));
+}
+
+TEST(BodySurvey, KeepsEveryMarkWithItsPlaceAndItsPlane) {
+  test::BodyScene scene;
+  scene.X_CB = test::looking_at_body({1, 1, 1}, 2900, 10);
+  BodyTarget body;
+  body.marks = test::published_body(scene.radius_mm, true);
+  body.problem.camera = scene.camera;
+  Survey survey({0, body, 1});
+  const test::Pixels first = test::photograph(scene);
+  scene.seed = 2;
+  const test::Pixels second = test::photograph(scene);
+  const SurveyVerdict verdict = survey.look(1, Pose::Identity(), first.view(), second.view());
+  ASSERT_EQ(verdict.code, Code::ok) << verdict.reason;
+  const std::vector<SurveyPoint>& points = survey.views().at(1).points;
+  ASSERT_EQ(points.size(), 44u);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    EXPECT_EQ(points[i].p_B_mm, body.marks[i].p_B_mm);
+    EXPECT_EQ(points[i].radius_mm, 8);
+    EXPECT_GT(points[i].normal_B.dot(test::body_normal(body.marks[i])), 0.999);
+    EXPECT_LT((points[i].u_px - scene.centre_px(body.marks[i])).norm(), 0.1);
+  }
+}
+
+TEST(BodySurvey, WithoutABodyInSightSaysSo) {
+  BodyTarget body;
+  body.marks = test::published_body(8, true);
+  Survey survey({0, body, 1});
+  const std::vector<std::uint8_t> grey(768 * 572, 120);
+  const ImageView empty{grey.data(), 768, 572, 768};
+  const SurveyVerdict verdict = survey.look(1, Pose::Identity(), empty, empty);
+  EXPECT_EQ(verdict.code, Code::too_few_marks);
+  EXPECT_THAT(verdict.reason, HasSubstr("the body is not found"));
 }
 
 }  // namespace

@@ -335,6 +335,22 @@ TEST(Codec, CommandOfWrongLengthOrCrc) {
   EXPECT_TRUE(decode_command(r, false));
 }
 
+TEST(Codec, TheTargetBlockComesBackWholeOrNotAtAll) {
+  TargetBlock target{0xA0B0C0D0, 27, no_values};
+  for (std::size_t i = 0; i < 6; ++i) target.values[i] = -static_cast<std::int32_t>(i) - 1;
+  const TargetRegisters r = encode_target(target);
+  EXPECT_EQ((std::array{r[0], r[1], r[2], r[3], r[4], r[5]}),
+            (std::array<std::uint16_t, 6>{0xA0B0, 0xC0D0, 0, 27, 0xFFFF, 0xFFFF}));
+  EXPECT_EQ(decode_target(r), target);
+  EXPECT_FALSE(decode_target(std::span(r).first(21)));
+  EXPECT_FALSE(decode_target(r, default_command_data_id));
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    TargetRegisters damaged = r;
+    damaged[i] ^= 0x0100;
+    EXPECT_FALSE(decode_target(damaged)) << i;
+  }
+}
+
 TEST(Codec, EveryRegisterOfThePositionBlock) {
   PositionBlock position{0x01020304, no_values};
   for (std::size_t i = 0; i < 6; ++i) position.values[i] = -static_cast<std::int32_t>(i) - 1;

@@ -162,6 +162,17 @@ TEST(Rules, ReadsOfTheBlock) {
   }
 }
 
+TEST(Rules, ReadsOfTheTargetBlockOnlyAsAWhole) {
+  for (const std::uint8_t function : std::initializer_list<std::uint8_t>{3, 4}) {
+    EXPECT_EQ(ruling(read_pdu(function, 200, 22), false).kind, Ruling::Kind::target);
+    EXPECT_EQ(exception_of(read_pdu(function, 200, 21)), 2);
+    EXPECT_EQ(exception_of(read_pdu(function, 200, 23)), 2);
+    EXPECT_EQ(exception_of(read_pdu(function, 199, 22)), 2);
+  }
+  const std::vector<std::uint16_t> many(22);
+  EXPECT_EQ(exception_of(write_pdu(200, many)), 2);
+}
+
 TEST(Rules, WritesOfTheCommandBlockOnly) {
   const std::vector<std::uint16_t> many(100);
   EXPECT_EQ(ruling(write_pdu(1000, std::span(many).first(10))).kind, Ruling::Kind::command);

@@ -49,6 +49,23 @@ TEST_F(LinkTest, HoldingRegistersMirrorTheBlock) {
   EXPECT_EQ(*input, *holding);
 }
 
+TEST_F(LinkTest, TargetsAreShownWithTheEpochOfNow) {
+  start();
+  RawModbus client(server->port());
+  const auto target = [&] { return decode_target(client.read_registers(4, 200, 22).value()); };
+  ASSERT_TRUE(target());
+  EXPECT_EQ(target()->index, 0u);
+  EXPECT_EQ(target()->values, no_values);
+  const Pose X_RH = from_six_numbers({1234.5, -20, 300, 10, -20, 30});
+  endpoint->show_target(7, X_RH);
+  EXPECT_EQ(target()->epoch, client.block().epoch);
+  EXPECT_EQ(target()->index, 7u);
+  EXPECT_EQ(target()->values, *to_wire(endpoint->options().convention, X_RH));
+  endpoint->show_target(0, X_RH);
+  EXPECT_EQ(target()->index, 0u);
+  EXPECT_EQ(target()->values, no_values);
+}
+
 TEST_F(LinkTest, PartialReads) {
   start();
   RawModbus client(server->port());
