@@ -121,6 +121,8 @@ StationStart why_not(const StationNetworkProblem& problem, const std::vector<Gro
             {}};
   }
   const Joint joint = joint_of(problem, groups[other], groups[alone]);
+  if (joint.status == StationNetworkStatus::ok)
+    return {StationNetworkStatus::not_converged, who + ": its points join the others only one way round", {}};
   return {joint.status, joint.reason, {}};
 }
 

@@ -217,9 +217,10 @@ Json answer_question(Cycle& cycle, const Json& question) {
   if (cmd == "snapshot")
     return snapshot_answer(cycle, question.at("camera").get<std::string>(), question.value("marks", true));
   if (cmd == "survey-start")
-    return cycle.start_survey(survey_options(cycle.cell(), question)), Json{{"status", "ok"}};
+    return {{"status", "ok"}, {"survey", cycle.start_survey(survey_options(cycle.cell(), question))}};
   if (cmd == "survey") return survey_json(cycle.survey_now());
-  if (cmd == "survey-end") return cycle.end_survey(), Json{{"status", "ok"}};
+  if (cmd == "survey-end")
+    return cycle.end_survey(question.at("survey").get<std::uint64_t>()), Json{{"status", "ok"}};
   return {{"status", "error"},
           {"reason", "unknown cmd \"" + cmd +
                          "\"; known: status, measure, zero, snapshot, survey-start, survey, survey-end"}};

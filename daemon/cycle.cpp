@@ -28,7 +28,7 @@ void log_change(const CameraStatus& camera) {
 
 void log_proposal(const CalibratedCamera& camera, const CameraProposal& proposal) {
   if (!proposal.X_CoCn)
-    return spdlog::warn("{}: where it is now is not known: {}", camera.name, proposal.result.reason);
+    return spdlog::warn("{}: where it is now is not known: {}", camera.name, proposal.reason);
   spdlog::warn("{}: by {} reference points it turned by {:.4f} deg and went {:.3f} mm", camera.name,
                proposal.points.size(), degrees_per_radian * log_so3(proposal.X_CoCn->linear()).norm(),
                proposal.X_CoCn->translation().norm());
@@ -162,13 +162,13 @@ void Cycle::remember(const ReferenceCheck& check) {
 }
 
 void Cycle::propose_places() {
-  if (!moved_) return;
-  const auto& [job, eyes, frames, cameras, measurement] = *moved_;
+  const auto moved = std::exchange(moved_, std::nullopt);
+  if (!moved) return;
+  const auto& [job, eyes, frames, cameras, measurement] = *moved;
   const auto images = images_of(eyes, frames);
   proposal_ = propose({images, *job, cameras, zeros_[selected_].record->zero, X_O0O_last_, &cell_.references},
                       measurement);
   for (const CameraProposal& camera : proposal_.cameras) log_proposal(cameras[camera.camera], camera);
-  moved_.reset();
 }
 
 Status Cycle::status() const {
@@ -196,7 +196,11 @@ void Cycle::carry_out(const Request& request) {
   report.ticket = request.ticket;
   refresh();  // a new zero or job is known to the robot before the answer is
   links_.at(request.robot)->publish(report);
-  propose_places();
+  try {
+    propose_places();
+  } catch (const std::exception& error) {
+    spdlog::error("where the camera is now: {}", error.what());
+  }
   const std::lock_guard lock(mutex_);
   ++status_.cycles;
 }
@@ -300,6 +304,7 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
   const auto cameras = cameras_for(cell_, job, hands_.hands(job));
   m = zeropose::measure({images, job, cameras, zero->zero, X_O0O_last_, references, &trend_});
   remember(m.references);
+  proposal_ = {};
   if (m.code == Code::camera_moved) moved_ = {&job, grabbed.eyes, outcome.frames, cameras, m};
   follow_health(health_, images, m, job, cell_);
   for (const std::size_t eye : grabbed.eyes)

@@ -51,9 +51,9 @@ struct Snapshot {
 };
 
 struct SurveyState {
+  std::uint64_t number = 0;            // of this survey, counted from 1 since the start
   std::optional<Survey> survey;        // none runs
   std::string last_problem;            // of the last position that was told; empty: it was taken
-  TimePoint asked{};                   // when it was last asked for
   std::optional<std::size_t> robot{};  // that goes through it; others are none of it
 };
 
@@ -103,11 +103,11 @@ class Cycle {
   Snapshot snapshot_now(std::size_t camera);
 
   // While a survey runs AtPosition belongs to it. A new one takes the place of the old one. One that nobody
-  // asks for any more ends by itself.
-  void start_survey(const SurveyOptions& options);
+  // asks for any more ends by itself; sooner where it tells a robot where to go. Returns its number.
+  std::uint64_t start_survey(const SurveyOptions& options);
   // What it has gathered, and the last position that was not taken.
   SurveyState survey_now();
-  void end_survey();
+  void end_survey(std::uint64_t number);  // another one goes on
 
   Status status() const;
   const Cell& cell() const { return cell_; }
@@ -142,10 +142,12 @@ class Cycle {
   // A picture of the camera on the hand, for the next measurement or zero of that part; a survey's otherwise.
   Code at_position(const Request& request);
   Told look_from_hand(const Request& request);
+  Told told_survey(const Request& request);
   Told look_for_survey(const Request& request);
   // Shows the survey's robot where to go after this position; without a survey nobody goes anywhere.
   void show_target(int after);
   void end_forgotten_survey();
+  void forget_survey();
   FrameSet grab_for(const Request& request, std::size_t camera);
   // part: whose pictures from hands count; none: of whichever was looked at last.
   MeasureOutcome measure(std::optional<std::uint32_t> part, TimePoint deadline,
@@ -187,6 +189,7 @@ class Cycle {
   Status status_;
   bool stopping_ = false;
   std::atomic<TimePoint> last_progress_{};
+  std::atomic<TimePoint> survey_asked_{};  // when the survey was last asked for
   std::thread thread_;
 };
 

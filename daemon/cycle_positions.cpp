@@ -10,15 +10,21 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds forgotten_after{30};
+constexpr std::chrono::seconds forgotten_after{30}, driven_forgotten_after{10};
 constexpr std::uint32_t zero_part = 0;  // as Zero has it: of several rounds
 
 }  // namespace
 
 void Cycle::end_forgotten_survey() {
-  if (!survey_.survey || Clock::now() - survey_.asked <= forgotten_after) return;
-  spdlog::warn("the survey ends: nobody asked for it for {} s", forgotten_after.count());
-  survey_ = {};
+  if (!survey_.survey) return;
+  const auto patience = survey_.survey->options().targets.empty() ? forgotten_after : driven_forgotten_after;
+  if (Clock::now() - survey_asked_.load() <= patience) return;
+  spdlog::warn("the survey ends: nobody asked for it for {} s", patience.count());
+  forget_survey();
+}
+
+void Cycle::forget_survey() {
+  survey_ = {survey_.number, {}, {}, {}};
   show_target(0);
 }
 
@@ -37,7 +43,7 @@ void Cycle::show_target(int after) {
 Code Cycle::at_position(const Request& request) {
   end_forgotten_survey();
   const bool surveys = survey_.survey && survey_.robot.value_or(request.robot) == request.robot;
-  const Told told = surveys ? look_for_survey(request) : look_from_hand(request);
+  const Told told = surveys ? told_survey(request) : look_from_hand(request);
   spdlog::info("{} request {}: position {} of part {}: code {} {}{}", cell_.robots.at(request.robot).name,
                request.id, request.argument, request.part, static_cast<int>(told.code),
                text_of(told.code).name, told.reason.empty() ? "" : " (" + told.reason + ")");
@@ -72,6 +78,15 @@ FrameSet Cycle::grab_for(const Request& request, std::size_t camera) {
                             std::min(request.deadline - compute_reserve, Clock::now() + cell_.deadline));
 }
 
+// A survey goes on whatever happens at one position.
+Cycle::Told Cycle::told_survey(const Request& request) {
+  try {
+    return look_for_survey(request);
+  } catch (const std::exception& error) {
+    return {Code::internal, error.what()};
+  }
+}
+
 Cycle::Told Cycle::look_for_survey(const Request& request) {
   survey_.robot = request.robot;
   std::vector<Frame> frames;
@@ -86,27 +101,26 @@ Cycle::Told Cycle::look_for_survey(const Request& request) {
   return {verdict.code, std::move(verdict.reason)};
 }
 
-void Cycle::start_survey(const SurveyOptions& options) {
-  run_between<bool>([this, options] {
+std::uint64_t Cycle::start_survey(const SurveyOptions& options) {
+  survey_asked_ = Clock::now();
+  return run_between<std::uint64_t>([this, options] {
     hands_.forget();
     const bool drives = !options.targets.empty();
-    survey_ = {Survey(options), {}, Clock::now(), drives ? std::optional(options.robot) : std::nullopt};
+    survey_ = {survey_.number + 1, Survey(options), {}, drives ? std::optional(options.robot) : std::nullopt};
     show_target(0);
-    return true;
+    return survey_.number;
   });
 }
 
 SurveyState Cycle::survey_now() {
-  return run_between<SurveyState>([this] {
-    survey_.asked = Clock::now();
-    return survey_;
-  });
+  survey_asked_ = Clock::now();
+  return run_between<SurveyState>([this] { return survey_; });
 }
 
-void Cycle::end_survey() {
-  run_between<bool>([this] {
-    survey_ = {};
-    show_target(0);
+void Cycle::end_survey(std::uint64_t number) {
+  run_between<bool>([this, number] {
+    if (survey_.number != number) return false;
+    forget_survey();
     return true;
   });
 }

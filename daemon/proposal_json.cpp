@@ -35,8 +35,8 @@ Json camera_json(const CameraProposal& proposal, const CalibratedCamera& camera)
   const bool good = result.code == Code::ok;
   return {{"camera", camera.name},
           {"method", name_of(proposal.method)},
-          {"status", good ? "ok" : "failed"},
-          {"reason", result.reason},
+          {"status", proposal.X_CoCn ? "ok" : "failed"},
+          {"reason", proposal.reason},
           {"X_WC_before", six_json(camera.X_WC)},
           {"X_WC", good ? six_json(result.X_WCn) : Json()},
           {"X_CoCn", proposal.X_CoCn ? six_json(*proposal.X_CoCn) : Json()},

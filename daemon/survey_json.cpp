@@ -119,6 +119,7 @@ SurveyOptions survey_options(const Cell& cell, const Json& question) {
 
 Json survey_json(const SurveyState& state) {
   Json json{{"status", "ok"},
+            {"survey", state.number},
             {"positions", 0},
             {"missing", Json::array()},
             {"last_problem", state.last_problem},

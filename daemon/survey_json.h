@@ -17,9 +17,9 @@ namespace zeropose {
 // std::invalid_argument or what JSON throws for a wrong question.
 SurveyOptions survey_options(const Cell& cell, const nlohmann::json& question);
 
-// {"positions", "missing": [..], "last_problem", "views": [{"position", "X_RH": [x, y, z, rx, ry, rz],
-// "points": [{x_mm, y_mm, z_mm, u_px, v_px, suu, svv, suv, radius_mm, nx, ny, nz}]}]}; positions 0: none
-// runs.
+// {"survey": its number, "positions", "missing": [..], "last_problem", "views": [{"position", "X_RH": [x, y,
+// z, rx, ry, rz], "points": [{x_mm, y_mm, z_mm, u_px, v_px, suu, svv, suv, radius_mm, nx, ny, nz}]}]};
+// positions 0: none runs.
 nlohmann::json survey_json(const SurveyState& state);
 
 }  // namespace zeropose

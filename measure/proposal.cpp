@@ -31,8 +31,7 @@ std::vector<RecalibrationPoint> points_of(const MeasurementProblem& problem, con
     const MarkFinding& now = measurement.reference_findings[i];
     if (view.camera != proposal.camera || now.status != MarkStatus::found) continue;
     const ReferencePoint& point = references.points[view.mark];
-    if (point.taught_px && proposal.method != RecalibrationMethod::arbitrary_points) continue;
-    if (point.group.empty() && proposal.method == RecalibrationMethod::groups) continue;
+    if (!counts_for(proposal.method, point)) continue;
     const auto zero = std::ranges::find_if(problem.zero.references, [&](const Observation& each) {
       return each.camera == view.camera && each.mark == view.mark;
     });
@@ -41,16 +40,33 @@ std::vector<RecalibrationPoint> points_of(const MeasurementProblem& problem, con
   return points;
 }
 
-std::optional<Pose> change_of(RecalibrationProblem knocked, const RecalibrationResult& result) {
-  if (result.code != Code::ok) return std::nullopt;
-  if (knocked.method != RecalibrationMethod::known_points) return result.X_CoCn;
-  std::vector<RecalibrationPoint> before(knocked.points.begin(), knocked.points.end());
-  for (RecalibrationPoint& point : before)
-    point.new_px = point.old_px, point.new_covariance_px2 = point.old_covariance_px2;
+// The old pixels by the same points and with the same weights as the new ones, so that what is wrong with
+// them is the same in both.
+RecalibrationResult pose_before(RecalibrationProblem knocked, const RecalibrationResult& now) {
+  std::vector<RecalibrationPoint> before;
+  for (std::size_t i = 0; i < knocked.points.size(); ++i) {
+    if (std::ranges::find(now.removed, i) != now.removed.end()) continue;
+    before.push_back(knocked.points[i]);
+    before.back().new_px = before.back().old_px;
+  }
   knocked.points = before;
-  const RecalibrationResult old = recalibrate(knocked);
-  if (old.code != Code::ok) return std::nullopt;
-  return Pose(old.X_WCn.inverse() * result.X_WCn);
+  knocked.sigma_px = 0;  // coordinates that are not quite right do not contradict each other
+  return recalibrate(knocked);
+}
+
+void find_change(const RecalibrationProblem& knocked, CameraProposal& proposal) {
+  const RecalibrationResult& now = proposal.result;
+  proposal.reason = now.reason;
+  if (now.code != Code::ok) return;
+  if (knocked.method != RecalibrationMethod::known_points) {
+    proposal.X_CoCn = now.X_CoCn;
+    return;
+  }
+  const RecalibrationResult before = pose_before(knocked, now);
+  if (before.code == Code::ok)
+    proposal.X_CoCn = before.X_WCn.inverse() * now.X_WCn;
+  else
+    proposal.reason = "the pixels of the zero measurement give no pose: " + before.reason;
 }
 
 CameraProposal proposal_for(const MeasurementProblem& problem, const Measurement& measurement,
@@ -66,11 +82,16 @@ CameraProposal proposal_for(const MeasurementProblem& problem, const Measurement
   knocked.points = proposal.points;
   knocked.sigma_px = 1;
   proposal.result = recalibrate(knocked);
-  proposal.X_CoCn = change_of(knocked, proposal.result);
+  find_change(knocked, proposal);
   return proposal;
 }
 
 }  // namespace
+
+bool counts_for(RecalibrationMethod method, const ReferencePoint& point) {
+  if (point.taught_px) return method == RecalibrationMethod::arbitrary_points;
+  return method != RecalibrationMethod::groups || !point.group.empty();
+}
 
 RecalibrationMethod suited_method(const References& references, std::size_t camera) {
   std::map<std::string, int> groups;

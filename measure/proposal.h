@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "measure/measurement.h"
@@ -14,14 +15,18 @@ namespace zeropose {
 // known_points where it has three with coordinates, else arbitrary_points.
 RecalibrationMethod suited_method(const References& references, std::size_t camera);
 
+// Whether the method can use the point.
+bool counts_for(RecalibrationMethod method, const ReferencePoint& point);
+
 struct CameraProposal {
   std::size_t camera = 0;
   RecalibrationMethod method = RecalibrationMethod::known_points;
   std::vector<RecalibrationPoint> points;  // the references that were seen, of those that the method can use
   RecalibrationResult result;              // X_WCn is what to activate; a new zero belongs to it
   // What the knock did. Of known points from where the pixels of the zero measurement put the camera, not
-  // from where it is calibrated: errors of calibration and coordinates cancel. None: there is no answer.
+  // from where it is calibrated: errors of calibration and coordinates cancel.
   std::optional<Pose> X_CoCn;
+  std::string reason;  // why there is no X_CoCn, one sentence
 };
 
 struct Proposal {

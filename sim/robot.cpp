@@ -289,6 +289,10 @@ std::optional<HandTarget> SimulatedRobot::target() {
   if (!read_block(block, answer) ||
       !read_registers(target_reg::first, target_reg::block_size, registers, answer))
     return std::nullopt;
+  if (answer.block.robot_index != options_.robot_index ||
+      answer.block.convention != static_cast<std::uint16_t>(options_.convention) ||
+      answer.block.has(status_bit::error) || answer.block.state == LinkState::halted)
+    return std::nullopt;
   const auto target = decode_target(registers, options_.result_data_id);
   if (!target || target->index == 0 || target->epoch != answer.block.epoch) return std::nullopt;
   const auto X_RH = from_wire(options_.convention, target->values);

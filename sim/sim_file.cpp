@@ -113,6 +113,7 @@ std::vector<PrintedMark> printed_marks(const std::filesystem::path& file) {
 ShownBody read_body(JsonObject& object, const std::filesystem::path& folder, SurveyDrive& survey) {
   ShownBody body;
   std::string file;
+  if (object.has("board") && object.has("body")) object.add_mistake("body", "a board as well", "one of both");
   object.read_optional("board", [&](JsonObject& board) { body.marks = read_board(board); });
   if (object.read_optional("body", file)) body.marks = printed_marks(folder / file);
   Pose X_HB = Pose::Identity();

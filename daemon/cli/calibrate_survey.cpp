@@ -1,4 +1,5 @@
 #include <chrono>
+#include <csignal>
 #include <iomanip>
 #include <iostream>
 #include <memory>
@@ -30,7 +31,7 @@ constexpr const char* help =
 program goes through its positions and tells each by AtPosition (index from 1, pose of the hand; docs/modbus.md). At
 each one the camera takes two pictures and looks for the target; the robot is answered "done", or why the position
 does not count (the target is out of sight, hidden, twice there, or still moving), and may tell it again. No position
-is lost: what was gathered when the time is up is written too.
+is lost: what was gathered when the time is up, or at Ctrl-C, is written too.
   --target ball      one ball anywhere in the picture: ball grids. Then: zeropose calibrate ball
   --target circles, asymmetric-circles, chessboard
                      a board of --rows --cols --pitch-mm: hand-eye. Then: zeropose calibrate hand-eye. It must look
@@ -41,7 +42,7 @@ is lost: what was gathered when the time is up is written too.
 Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards and bodies also x_mm
 y_mm z_mm, and with a radius radius_mm nx ny nz).
 The robot's own program knows the positions; or, with --drive ROBOT, the daemon tells it where to go, one position
-after the other (target block, docs/modbus.md): --targets file.csv (view x_mm .. rz_deg: X_RH), or a grid of 3 x 3 x 3
+after the other (target block, docs/modbus.md): --targets file.csv (view x_mm .. rz_deg: X_RH; counted from 1), or a grid of 3 x 3 x 3
 from --first in steps of --step along the base's axes, or with --along-hand the hand's. The robot moves only inside its
 own space, which its program checks; a position that is not taken comes again at the end.
 Examples:
@@ -119,6 +120,10 @@ void refuse_contradictions(const Options& options) {
       throw std::invalid_argument("--target body: expected --body, the table of its marks");
     return;
   }
+  if (options.diameter_mm < 0 || options.diameter_mm >= 2 * options.pitch_mm ||
+      (options.diameter_mm > 0 && options.target == "chessboard"))
+    throw std::invalid_argument(
+        "--diameter-mm: expected that of a board's circles, less than their distance");
   if (options.rows < 2 || options.cols < 2 || !(options.pitch_mm > 0))
     throw std::invalid_argument(
         concat({"--target ", options.target, ": expected --rows, --cols (2 and more) and --pitch-mm"}));
@@ -157,15 +162,42 @@ std::vector<Pose> targets_of(const Options& options) {
   return targets;
 }
 
-Json gathered(const Options& options, std::size_t positions) {
+// Set by Ctrl-C: a robot must not be told where to go any longer.
+volatile std::sig_atomic_t interrupted = 0;
+
+// Ends the survey whatever happens.
+class RunningSurvey {
+ public:
+  RunningSurvey(const Options& options, const Json& question)
+      : options_(options), number_(ask_daemon(options, question)["survey"]) {
+    for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { interrupted = 1; });
+  }
+  ~RunningSurvey() {
+    try {
+      ask_daemon(options_, {{"cmd", "survey-end"}, {"survey", number_}});
+    } catch (const std::exception& error) {
+      std::cerr << error.what() << '\n';
+    }
+  }
+  RunningSurvey(const RunningSurvey&) = delete;
+  RunningSurvey& operator=(const RunningSurvey&) = delete;
+  std::uint64_t number() const { return number_; }
+
+ private:
+  const Options& options_;
+  const std::uint64_t number_;
+};
+
+Json gathered(const Options& options, std::uint64_t survey) {
   const auto deadline = Clock::now() + std::chrono::duration<double>(options.patience_s);
   std::size_t told = 0;
   std::string problem;
   for (;;) {
     const Json now = ask_daemon(options, {{"cmd", "survey"}});
-    if (now["positions"] != positions) throw ConfigError({"another survey took the place of this one"});
+    if (now["survey"] != survey || now["positions"] == 0)
+      throw ConfigError({"the survey was ended, or another one took its place"});
     tell_progress(now, told, problem);
-    if (now["missing"].empty() || Clock::now() >= deadline) return now;
+    if (now["missing"].empty() || Clock::now() >= deadline || interrupted) return now;
     std::this_thread::sleep_for(200ms);
   }
 }
@@ -217,25 +249,25 @@ Answer survey(const Options& options) {
                 {"target", target_of(options)}};
   if (!targets.empty()) question["robot"] = options.drive;
   for (const Pose& X_RH : targets) question["targets"].push_back(six_of(X_RH));
-  ask_daemon(options, question);
+  const RunningSurvey running(options, question);
   std::cerr << (targets.empty() ? "waiting for the robot to tell " : "the robot is told to go to ")
             << positions << " positions\n";
-  const Json all = gathered(options, positions);
+  const Json all = gathered(options, running.number());
   replace_file(options.robot, robot_table(all["views"]));
   replace_file(options.points, points_table(all["views"], options.target == "ball"));
-  ask_daemon(options, {{"cmd", "survey-end"}});
   std::string missing;
   for (const Json& position : all["missing"])
     missing += concat({missing.empty() ? "" : ", ", position.dump()});
   Answer answer;
-  answer.json = {
-      {"status", missing.empty() ? "ok" : "failed"},
-      {"reason", missing.empty() ? "" : "the time was up before the robot told position " + missing},
-      {"positions", all["positions"]},
-      {"missing", all["missing"]},
-      {"last_problem", all["last_problem"]},
-      {"robot", options.robot},
-      {"points", options.points}};
+  answer.json = {{"status", missing.empty() ? "ok" : "failed"},
+                 {"reason", missing.empty() ? ""
+                                            : concat({interrupted ? "stopped" : "the time was up",
+                                                      " before the robot told position ", missing})},
+                 {"positions", all["positions"]},
+                 {"missing", all["missing"]},
+                 {"last_problem", all["last_problem"]},
+                 {"robot", options.robot},
+                 {"points", options.points}};
   answer.exit_status = missing.empty() ? done : no_answer;
   answer.text = concat({std::to_string(all["views"].size()), " positions are in ", options.robot, " and ",
                         options.points, missing.empty() ? "" : "; missing are " + missing, "\n"});

@@ -97,6 +97,11 @@ std::string sigma_text(const Json& sigma) {
   return sigma[0].is_null() ? "of the turn alone, the shift is not known" : pose_text(sigma);
 }
 
+std::string shift_text(const Json& camera) {
+  if (camera["sigma"][0].is_null()) return {};
+  return "shifted by " + short_text(length_of(camera["X_CoCn"], 0)) + " mm, ";
+}
+
 std::string effect_text(const Json& effect) {
   if (effect.is_null()) return "unknown";
   return effect["X_O0O"].is_null()
@@ -115,10 +120,10 @@ void print_proposal(const Json& answer) {
       std::cout << "no answer: " << text_or(camera, "reason") << '\n';
       continue;
     }
-    std::cout << "turned by about " << short_text(length_of(camera["X_CoCn"], 3)) << " deg, shifted by "
-              << short_text(length_of(camera["X_CoCn"], 0)) << " mm, " << short_text(camera["rms_px"])
-              << " px left\n    X_WC was " << pose_text(camera["X_WC_before"]) << "\n    X_WC is  "
-              << pose_text(camera["X_WC"]) << "\n    sigma    " << sigma_text(camera["sigma"]) << '\n';
+    std::cout << "turned by about " << short_text(length_of(camera["X_CoCn"], 3)) << " deg, "
+              << shift_text(camera) << short_text(camera["rms_px"]) << " px left\n    X_WC was "
+              << pose_text(camera["X_WC_before"]) << "\n    X_WC is  " << pose_text(camera["X_WC"])
+              << "\n    sigma    " << sigma_text(camera["sigma"]) << '\n';
     for (const auto& warning : camera["warnings"])
       std::cout << "    warning: " << warning.get<std::string>() << '\n';
   }

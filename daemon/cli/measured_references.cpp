@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "config/text.h"
+#include "measure/proposal.h"
 
 namespace zeropose::cli {
 namespace {
@@ -41,7 +42,7 @@ const ReferencePoint& point_named(const Cell& cell, const std::string& name, con
 }  // namespace
 
 std::vector<RecalibrationPoint> measured_references(const Cell& cell, RecalibrationMethod method,
-                                                    const std::string& camera,
+                                                    bool suited_only, const std::string& camera,
                                                     const std::filesystem::path& file) {
   std::vector<RecalibrationPoint> points;
   bool any = false;
@@ -54,6 +55,7 @@ std::vector<RecalibrationPoint> measured_references(const Cell& cell, Recalibrat
       throw std::invalid_argument(concat({where, ": has no before_px: no zero measurement saw it"}));
     if (!reference.contains("after_px")) continue;
     const ReferencePoint& known = point_named(cell, name, where);
+    if (suited_only && !counts_for(method, known)) continue;
     if (known.taught_px && method != RecalibrationMethod::arbitrary_points)
       throw std::invalid_argument(
           concat({where, ": the cell file does not have its coordinates; take --method arbitrary"}));

@@ -35,8 +35,8 @@ covariance belong to X_WC, along and about the world's axes (mm, degrees; the co
 --sigma-px is the noise of one pixel coordinate; without it the sigmas come from the residuals.
 With --cell and --measured instead of --camera, --before, --after, --points: camera --name of the cell, its reference
 points, their pixels at the zero measurement and now. measured.json is what `zeropose measure --json` answered; noise is
-the cell's reference_check sigma_px unless --sigma-px says otherwise. The daemon has worked out the same already:
-zeropose status says where a moved camera is and what that changes.
+the cell's reference_check sigma_px unless --sigma-px says otherwise. The daemon proposes a place by itself,
+each pixel weighted by its own noise: zeropose status says where a moved camera is and what that changes.
 docs/recalibration.md says which points to choose.
 Examples:
   zeropose measure --json > measured.json
@@ -191,7 +191,7 @@ Knock knock_of_cell(const RecalibrateOptions& options) {
       options.method.empty() ? suited_method(cell.references, index) : method_of(options.method);
   return {method,
           {*camera, true},
-          measured_references(cell, method, options.name, options.measured),
+          measured_references(cell, method, options.method.empty(), options.name, options.measured),
           cell.references.sigma_px};
 }
 
