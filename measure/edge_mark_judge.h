@@ -28,6 +28,9 @@ MarkFinding judged_fit(const ContourFit& fit, const MarkSearch& search);
 struct JudgedMark {
   MarkFinding finding;
   double strength = 0;
+  // Edge: as in EdgeFinding.
+  Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
+  Eigen::Matrix2d line_covariance = Eigen::Matrix2d::Zero();
 };
 
 // One wanted: the strongest that passed; ambiguous, with its numbers, if another one is nearly as strong.

@@ -11,9 +11,11 @@ namespace zeropose {
 namespace {
 
 constexpr double pi = std::numbers::pi;
-constexpr double end_px = 3;                             // left out where an edge ends in the window
-constexpr double meeting_px = 7;                         // an arm is seen from that near to the corner on
-constexpr double beyond_px = 6;                          // and not further behind it
+constexpr double end_px = 3;  // left out where an edge ends in the window
+constexpr double piece_px = 2,
+                 piece_rad = 0.1;  // how far pieces of one line may be apart where it is asked for
+constexpr double meeting_px = 7;   // an arm is seen from that near to the corner on
+constexpr double beyond_px = 6;    // and not further behind it
 constexpr std::size_t most_corners = 8, most_edges = 8;  // fits per window where one is wanted
 
 double least_length(const MarkSearch& search) { return std::max(edge_least_px, search.min_diameter_px); }
@@ -41,12 +43,16 @@ bool band_in_window(const GreyWindow& window, const EdgeLine& line, double blur_
   return in >= contour_least_share * all;
 }
 
-// Across from the fit, along as good as unknown.
-Eigen::Matrix2d covariance_of_edge(const ContourFit& fit, double t, const Eigen::Vector2d& normal) {
+// Of the offset along the normal at t, and of the normal's direction.
+Eigen::Matrix2d covariance_of_line(const ContourFit& fit, double t) {
+  const Eigen::Matrix2d J{{1, -t}, {0, 1}};
+  return J * fit.covariance.topLeftCorner<2, 2>() * J.transpose();
+}
+
+// Across as given, along as good as unknown.
+Eigen::Matrix2d covariance_of_edge(double across_px2, const Eigen::Vector2d& normal) {
   const Eigen::Vector2d along(-normal.y(), normal.x());
-  const Eigen::Vector2d J(1, -t);  // of the offset along the normal at t
-  const double across = J.dot(fit.covariance.topLeftCorner<2, 2>() * J);
-  return across * normal * normal.transpose() + unknown_along_px2 * along * along.transpose();
+  return across_px2 * normal * normal.transpose() + unknown_along_px2 * along * along.transpose();
 }
 
 JudgedMark fit_edge(const GreyWindow& window, const MarkSearch& search, const EdgeLine& line,
@@ -63,16 +69,19 @@ JudgedMark fit_edge(const GreyWindow& window, const MarkSearch& search, const Ed
   const EdgeShape shape(run.from - t_origin, run.to - t_origin);
   const ContourFit fit = fit_contour(window, shape, start, workspace);
   JudgedMark mark{judged_fit(fit, search), 0};
+  mark.middle_px = to_image(window, middle);
   mark.finding.diameter_px = line.length();
   mark.strength = mark.finding.contrast * line.length();
   if (!fit.converged) mark.finding.contrast = line.contrast;
-  const double angle = fit.shape(1);
+  const ShapeParameters& at = fit.converged ? fit.shape : start.shape;
+  const double angle = at(1);
   const Eigen::Vector2d normal(std::cos(angle), std::sin(angle)), along(-normal.y(), normal.x());
   const Eigen::Vector2d expected = to_window(window, search.expected_px) - origin;
   const double t = along.dot(expected);
-  mark.finding.u_px = to_image(window, origin + fit.shape(0) * normal + t * along);
+  mark.finding.u_px = to_image(window, origin + at(0) * normal + t * along);
   mark.finding.direction_rad = wrapped_rad(angle);
-  mark.finding.covariance_px2 = covariance_of_edge(fit, t, normal);
+  mark.line_covariance = covariance_of_line(fit, t);
+  mark.finding.covariance_px2 = covariance_of_edge(mark.line_covariance(0, 0), normal);
   if (mark.finding.status == MarkStatus::found && fit.background_grey < fit.mark_grey) {
     mark.finding.status = MarkStatus::not_converged;
   }
@@ -96,6 +105,28 @@ JudgedMark judged_edge(const GreyWindow& window, const MarkSearch& search, const
     status = MarkStatus::cut_off;
   }
   return mark;
+}
+
+std::vector<JudgedMark> judged_edges(const GreyWindow& window, const MarkSearch& search, HowMany wanted) {
+  LineLimits limits = line_limits_of(search, wanted, most_edges);
+  limits.direction_rad = search.direction_rad;
+  limits.tolerance_rad = search.direction_tolerance_rad + 0.05;
+  std::vector<JudgedMark> marks;
+  ContourWorkspace workspace;
+  for (const EdgeLine& line : find_lines(window, limits))
+    marks.push_back(judged_edge(window, search, line, workspace));
+  return marks;
+}
+
+EdgeFinding with_line(const JudgedMark& mark, const std::vector<JudgedMark>& all) {
+  EdgeFinding edge{mark.finding, mark.middle_px, 0, mark.line_covariance};
+  for (const JudgedMark& other : all) {
+    const double turn = wrapped_rad(other.finding.direction_rad - mark.finding.direction_rad);
+    const bool piece =
+        (other.finding.u_px - mark.finding.u_px).norm() < piece_px && std::abs(turn) < piece_rad;
+    edge.strength += piece ? other.finding.contrast * other.finding.diameter_px : 0;
+  }
+  return edge;
 }
 
 // ---- corner
@@ -229,14 +260,24 @@ JudgedMark judged_corner(const GreyWindow& window, const MarkSearch& search, con
 MarkSight look_for_edges(const ImageView& image, const MarkSearch& search, HowMany wanted) {
   const OpenedWindow opened = open_window(image, search, false);
   if (opened.status != MarkStatus::found) return sight_without(opened.status);
-  LineLimits limits = line_limits_of(search, wanted, most_edges);
-  limits.direction_rad = search.direction_rad;
-  limits.tolerance_rad = search.direction_tolerance_rad + 0.05;
-  const std::vector<EdgeLine> lines = find_lines(opened.greys, limits);
-  std::vector<JudgedMark> marks;
-  ContourWorkspace workspace;
-  for (const EdgeLine& line : lines) marks.push_back(judged_edge(opened.greys, search, line, workspace));
-  return sight_of(marks, opened.greys, search, wanted);
+  return sight_of(judged_edges(opened.greys, search, wanted), opened.greys, search, wanted);
+}
+
+EdgeSight look_for_edge_lines(const ImageView& image, const MarkSearch& search, HowMany wanted) {
+  const OpenedWindow opened = open_window(image, search, false);
+  if (opened.status != MarkStatus::found) return {{}, {}, sight_without(opened.status).nearest};
+  const std::vector<JudgedMark> marks = judged_edges(opened.greys, search, wanted);
+  const MarkSight sight = sight_of(marks, opened.greys, search, wanted);
+  EdgeSight lines{{}, {}, sight.nearest};
+  for (const JudgedMark& mark : marks)
+    if (!stands(mark.finding)) lines.failed.push_back(with_line(mark, marks));
+  for (const MarkFinding& mark : sight.standing) {
+    const auto judged = std::find_if(marks.begin(), marks.end(), [&mark](const JudgedMark& other) {
+      return other.finding.u_px == mark.u_px && other.finding.direction_rad == mark.direction_rad;
+    });
+    if (judged != marks.end()) lines.standing.push_back(with_line(*judged, marks));
+  }
+  return lines;
 }
 
 MarkSight look_for_corners(const ImageView& image, const MarkSearch& asked, HowMany wanted) {

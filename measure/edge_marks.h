@@ -2,6 +2,9 @@
 // (spec 50 M0).
 #pragma once
 
+#include <Eigen/Core>
+#include <vector>
+
 #include "measure/image.h"
 #include "measure/mark_sight.h"
 #include "measure/marks.h"
@@ -20,6 +23,23 @@ namespace zeropose {
 // count. Too near to the window's border for its band: cut_off; nearer than 3 px it is not seen.
 inline constexpr double unknown_along_px2 = 1e6, edge_least_px = 8;
 MarkSight look_for_edges(const ImageView& image, const MarkSearch& search, HowMany wanted);
+
+// The same with the whole line of each edge. middle_px: of what is seen of it, diameter_px long; strength:
+// contrast times length, of all pieces that lie on its line; line_covariance: of its place at u_px along
+// direction_rad (px), and of direction_rad.
+struct EdgeFinding {
+  MarkFinding mark;
+  Eigen::Vector2d middle_px = Eigen::Vector2d::Zero();
+  double strength = 0;
+  Eigen::Matrix2d line_covariance = Eigen::Matrix2d::Zero();
+};
+struct EdgeSight {
+  std::vector<EdgeFinding> standing;
+  std::vector<EdgeFinding>
+      failed;           // seen and not passed, each with its reason; no covariance, place to about 1 px
+  MarkFinding nearest;  // as in MarkSight
+};
+EdgeSight look_for_edge_lines(const ImageView& image, const MarkSearch& search, HowMany wanted);
 
 // Where two edges meet. diameter_px: the longer arm that is seen, axis_ratio: the shorter one by it; each at
 // least min_diameter_px (edge_least_px if that is smaller). max_diameter_px and min_axis_ratio do not count.
