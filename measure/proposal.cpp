@@ -7,7 +7,7 @@
 namespace zeropose {
 namespace {
 
-constexpr int least_points = 3, least_groups = 2;
+constexpr std::size_t least_points = 3, least_groups = 2;
 
 RecalibrationPoint recalibration_point(const References& references, const Observation& zero,
                                        const MarkFinding& now) {
@@ -50,7 +50,6 @@ RecalibrationResult pose_before(RecalibrationProblem knocked, const Recalibratio
     before.back().new_px = before.back().old_px;
   }
   knocked.points = before;
-  knocked.sigma_px = 0;  // coordinates that are not quite right do not contradict each other
   return recalibrate(knocked);
 }
 
@@ -80,7 +79,9 @@ CameraProposal proposal_for(const MeasurementProblem& problem, const Measurement
   knocked.model = problem.cameras[camera].model;
   knocked.X_WCo = problem.cameras[camera].X_WC;
   knocked.points = proposal.points;
-  knocked.sigma_px = 1;
+  // Coordinates err by more than the pixels; of more points than it takes the residuals tell.
+  const bool known = proposal.method == RecalibrationMethod::known_points;
+  knocked.sigma_px = known && proposal.points.size() > least_points ? 0 : 1;
   proposal.result = recalibrate(knocked);
   find_change(knocked, proposal);
   return proposal;
@@ -94,17 +95,17 @@ bool counts_for(RecalibrationMethod method, const ReferencePoint& point) {
 }
 
 RecalibrationMethod suited_method(const References& references, std::size_t camera) {
-  std::map<std::string, int> groups;
-  int known = 0;
+  std::map<std::string, std::size_t> groups;
+  std::size_t known = 0;
   for (const View& view : references.views) {
     const ReferencePoint& point = references.points[view.mark];
     if (view.camera != camera || point.taught_px) continue;
     ++known;
     if (!point.group.empty()) ++groups[point.group];
   }
-  const auto whole =
+  const std::ptrdiff_t whole =
       std::ranges::count_if(groups, [](const auto& group) { return group.second >= least_points; });
-  if (whole >= least_groups) return RecalibrationMethod::groups;
+  if (whole >= static_cast<std::ptrdiff_t>(least_groups)) return RecalibrationMethod::groups;
   return known >= least_points ? RecalibrationMethod::known_points : RecalibrationMethod::arbitrary_points;
 }
 

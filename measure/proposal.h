@@ -38,7 +38,8 @@ struct Proposal {
 };
 
 // From a measurement and what it was made from; the references' own noise and References::sigma_px weigh the
-// pixels. Nothing is proposed (no cameras) where none was moved.
+// pixels. The sigmas are of these, but of more than three known points, whose coordinates err as well, from
+// the residuals. Nothing is proposed (no cameras) where none was moved.
 Proposal propose(const MeasurementProblem& problem, const Measurement& measurement);
 
 }  // namespace zeropose

@@ -35,7 +35,7 @@ covariance belong to X_WC, along and about the world's axes (mm, degrees; the co
 --sigma-px is the noise of one pixel coordinate; without it the sigmas come from the residuals.
 With --cell and --measured instead of --camera, --before, --after, --points: camera --name of the cell, its reference
 points, their pixels at the zero measurement and now. measured.json is what `zeropose measure --json` answered; noise is
-the cell's reference_check sigma_px unless --sigma-px says otherwise. The daemon proposes a place by itself,
+the cell's reference_check sigma_px, of more than three known points that of the residuals, unless --sigma-px says otherwise. The daemon proposes a place by itself,
 each pixel weighted by its own noise: zeropose status says where a moved camera is and what that changes.
 docs/recalibration.md says which points to choose.
 Examples:
@@ -189,10 +189,10 @@ Knock knock_of_cell(const RecalibrateOptions& options) {
   const auto index = static_cast<std::size_t>(camera - cell.calibration.begin());
   const RecalibrationMethod method =
       options.method.empty() ? suited_method(cell.references, index) : method_of(options.method);
-  return {method,
-          {*camera, true},
-          measured_references(cell, method, options.method.empty(), options.name, options.measured),
-          cell.references.sigma_px};
+  auto points = measured_references(cell, method, options.method.empty(), options.name, options.measured);
+  // Coordinates err by more than the pixels; of more points than it takes the residuals tell.
+  const bool from_residuals = method == RecalibrationMethod::known_points && points.size() > 3;
+  return {method, {*camera, true}, std::move(points), from_residuals ? 0 : cell.references.sigma_px};
 }
 
 // A calibrated pose that misses the pixels before by so much is another camera's, or the points are other
