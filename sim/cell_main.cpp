@@ -71,8 +71,8 @@ DriveOptions drive_options(const Options& options) {
 
 SurveyDrive survey_of(const Options& options) {
   const std::filesystem::path truth = sim_file_of(options.cell);
-  for (const SurveyDrive& survey : load_sim_file(truth).surveys)
-    if (survey.name == options.survey) return survey;
+  for (SurveyDrive& survey : load_sim_file(truth).surveys)
+    if (survey.name == options.survey) return load_marks(survey), survey;
   throw std::invalid_argument(truth.string() + " has no survey " + options.survey);
 }
 

@@ -115,7 +115,7 @@ ShownBody read_body(JsonObject& object, const std::filesystem::path& folder, Sur
   std::string file;
   if (object.has("board") && object.has("body")) object.add_mistake("body", "a board as well", "one of both");
   object.read_optional("board", [&](JsonObject& board) { body.marks = read_board(board); });
-  if (object.read_optional("body", file)) body.marks = printed_marks(folder / file);
+  if (object.read_optional("body", file)) body.table = folder / file;
   Pose X_HB = Pose::Identity();
   if (object.read_optional("in_hand", X_HB))
     body.X_HB = X_HB;
@@ -158,6 +158,11 @@ DriveOptions read_drive(JsonObject& object) {
 }
 
 }  // namespace
+
+void load_marks(SurveyDrive& survey) {
+  auto* body = std::get_if<ShownBody>(&survey.target);
+  if (body != nullptr && !body->table.empty()) body->marks = printed_marks(body->table);
+}
 
 SimFile load_sim_file(const std::filesystem::path& path) {
   const JsonValue tree = parse_json(read_file(path), path.string());

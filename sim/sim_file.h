@@ -27,6 +27,10 @@ struct SimFile {
 // types, values out of range.
 SimFile load_sim_file(const std::filesystem::path& path);
 
+// Reads the table of the body that a survey shows; nothing to do for others. Throws ConfigError: also for
+// marks without a radius or a normal.
+void load_marks(SurveyDrive& survey);
+
 // A calibration file of these cameras with `comment` as its first line.
 std::string calibration_text(std::span<const CalibratedCamera> cameras, std::string_view comment);
 

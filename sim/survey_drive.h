@@ -4,6 +4,7 @@
 #pragma once
 
 #include <atomic>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <string>
@@ -23,7 +24,8 @@ struct BallInHand {
 
 // A board or body on the hand; without X_HB it stands still and the hand carries the camera.
 struct ShownBody {
-  std::vector<PrintedMark> marks;
+  std::filesystem::path table;     // of a body's marks; empty: a board
+  std::vector<PrintedMark> marks;  // of a body not before load_marks()
   std::optional<Pose> X_HB;
   Pose X_WB = Pose::Identity();
 };
