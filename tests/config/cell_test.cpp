@@ -24,7 +24,8 @@ TEST(Cell, LoadsTheExample) {
   EXPECT_FALSE(cell.cameras[2].exposure_us);
   ASSERT_EQ(cell.calibration.size(), 4U);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(cell.calibration[i].name, cell.cameras[i].name);
-  ASSERT_EQ(cell.robots.size(), 1U);
+  ASSERT_EQ(cell.robots.size(), 2U);
+  EXPECT_EQ(std::get<CanOptions>(cell.robots[1].link).interface, "vcan0");
   const auto& link = std::get<ModbusTcpOptions>(cell.robots[0].link);
   EXPECT_EQ(link.port, 1502);
   EXPECT_EQ(cell.robots[0].convention, Convention::kuka);

@@ -21,7 +21,12 @@ inline const std::string& example_calibration_text() {
 }
 
 inline Json parsed(const std::string& text) { return Json::parse(text, nullptr, true, true); }
-inline Json example() { return parsed(example_text()); }
+// With its first robot alone.
+inline Json example() {
+  Json json = parsed(example_text());
+  json["robots"].erase(1);
+  return json;
+}
 inline Json example_calibration() { return parsed(example_calibration_text()); }
 
 inline std::vector<std::string> mistakes_in(const std::string& cell,

@@ -226,7 +226,7 @@ class ConventionTest(Case):
         return run_json("robot", "test", "--robot-went", self.went(poses), *more)
 
     def test_the_right_convention_is_proven(self):
-        status, answer, err = self.check([kuka(six) for six in SHIFTS], "--cell", CELL)
+        status, answer, err = self.check([kuka(six) for six in SHIFTS], "--cell", CELL, "--robot", "robot1")
         self.assertEqual((status, answer["status"], answer["proven"]), (0, "ok", True), err)
         self.assertEqual(answer["convention"], "kuka")
         self.assertEqual(answer["same_numbers"], ["kuka", "epson"])
@@ -275,7 +275,7 @@ class ConventionTest(Case):
             return {"status": "ok"}
 
         with line_socket(self.path("cell.sock"), cell):
-            status, answer, err = self.check([kuka(six) for six in SHIFTS], "--cell", CELL, "--simulated",
+            status, answer, err = self.check([kuka(six) for six in SHIFTS], "--cell", CELL, "--robot", "robot1", "--simulated",
                                              self.path("cell.sock"))
         self.assertEqual((status, answer["proven"]), (0, True), err)
         self.assertEqual({question["cmd"] for question in asked}, {"shift"})
@@ -297,7 +297,7 @@ class ConventionTest(Case):
 
         shifted = [kuka([six[0] + 2] + six[1:]) for six in SHIFTS]
         with line_socket(self.path("cell.sock"), cell), line_socket(self.path("daemon.sock"), daemon):
-            status, answer, err = self.check(shifted, "--cell", CELL, "--simulated", self.path("cell.sock"),
+            status, answer, err = self.check(shifted, "--cell", CELL, "--robot", "robot1", "--simulated", self.path("cell.sock"),
                                              "--socket", self.path("daemon.sock"))
         self.assertEqual((status, answer["proven"]), (0, True), err)
         self.expect_near(answer["places"][1]["measured"], [32, 0, 0, 0, 0, 0], 1e-9)
