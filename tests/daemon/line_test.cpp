@@ -160,6 +160,40 @@ TEST_F(Line, MovedCameraIsNamedAndPutBackItCountsAgain) {
   EXPECT_TRUE(line.ask_daemon({{"cmd", "status"}})["proposal"].is_null());
 }
 
+// Only the robot that a survey drives sees a target, and only while that survey runs.
+TEST_F(Line, ATargetLivesAsLongAsItsSurvey) {
+  start_all();
+  const Json start = {{"cmd", "survey-start"},
+                      {"camera", "camera1"},
+                      {"target", {{"kind", "ball"}, {"min_diameter_px", 300}, {"max_diameter_px", 400}}},
+                      {"positions", 2},
+                      {"robot", "robot1"},
+                      {"targets", {{2000, 1400, 360, 110, -3, -125}, {2100, 1400, 360, 110, -3, -125}}}};
+  EXPECT_FALSE(line.robot().target());
+  const Json first = line.ask_daemon(start);
+  ASSERT_EQ(first["status"], "ok") << first;
+  auto target = line.robot().target();
+  ASSERT_TRUE(target);
+  EXPECT_EQ(target->index, 1u);
+  EXPECT_NEAR(target->X_RH.translation().x(), 2000, 1e-3);
+  // There is no ball: the next one first, this one again at the end.
+  const RobotAnswer answer = line.robot().at_position(job, 0, 1, target->X_RH);
+  EXPECT_EQ(answer.code, static_cast<int>(Code::too_few_marks)) << answer.refusal;
+  target = line.robot().target();
+  ASSERT_TRUE(target);
+  EXPECT_EQ(target->index, 2u);
+  const Json second = line.ask_daemon(start);
+  line.ask_daemon({{"cmd", "survey-end"}, {"survey", first["survey"]}});  // no longer the one that runs
+  target = line.robot().target();
+  ASSERT_TRUE(target);
+  EXPECT_EQ(target->index, 1u);
+  line.ask_daemon({{"cmd", "survey-end"}, {"survey", second["survey"]}});
+  EXPECT_FALSE(line.robot().target());
+  Json other = start;
+  other["robot"] = "robot2";
+  EXPECT_THAT(line.ask_daemon(other)["reason"].get<std::string>(), HasSubstr("cannot be told where to go"));
+}
+
 TEST_F(Line, CoveredReferencesAreNamed) {
   start_all();
   line.fault("cover-mark", {{"mark", "camera1/R1"}});
