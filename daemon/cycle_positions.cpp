@@ -41,7 +41,6 @@ void Cycle::show_target(int after) {
 }
 
 Code Cycle::at_position(const Request& request) {
-  end_forgotten_survey();
   const bool surveys = survey_.survey && survey_.robot.value_or(request.robot) == request.robot;
   const Told told = surveys ? told_survey(request) : look_from_hand(request);
   spdlog::info("{} request {}: position {} of part {}: code {} {}{}", cell_.robots.at(request.robot).name,

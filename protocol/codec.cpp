@@ -17,6 +17,19 @@ std::uint32_t get32(std::span<const std::uint16_t> registers, std::size_t at) {
   return (std::uint32_t{registers[at]} << 16) | registers[at + 1];
 }
 
+// The eight values of a block, two registers each.
+void put_values(std::span<std::uint16_t> registers, std::size_t first, const WireValues& values) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    put32(registers, first + 2 * i, static_cast<std::uint32_t>(values[i]));
+}
+
+WireValues get_values(std::span<const std::uint16_t> registers, std::size_t first) {
+  WireValues values{};
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<std::int32_t>(get32(registers, first + 2 * i));
+  return values;
+}
+
 std::size_t value_count(Convention convention) { return convention == Convention::abb ? 7 : 6; }
 
 // Units per unit of to_maker().
@@ -64,8 +77,7 @@ ResultBlock read_fields(std::span<const std::uint16_t> r) {
   block.state = static_cast<LinkState>(r[reg::state]);
   block.status = r[reg::status];
   block.code = r[reg::code];
-  for (std::size_t i = 0; i < reg::value_count; ++i)
-    block.values[i] = static_cast<std::int32_t>(get32(r, reg::values + 2 * i));
+  block.values = get_values(r, reg::values);
   block.convention = r[reg::convention];
   block.frame = r[reg::frame];
   block.age_ms = r[reg::age];
@@ -150,9 +162,7 @@ ResultRegisters encode(const ResultBlock& block, std::uint16_t data_id) {
   r[reg::status] = block.status;
   r[reg::code] = block.code;
   // Whatever the caller did: without the valid bit no value leaves the house.
-  const WireValues& values = block.has(status_bit::result_valid) ? block.values : no_values;
-  for (std::size_t i = 0; i < reg::value_count; ++i)
-    put32(r, reg::values + 2 * i, static_cast<std::uint32_t>(values[i]));
+  put_values(r, reg::values, block.has(status_bit::result_valid) ? block.values : no_values);
   r[reg::convention] = block.convention;
   r[reg::frame] = block.frame;
   r[reg::age] = block.age_ms;
@@ -221,16 +231,14 @@ std::optional<PositionBlock> decode_position(std::span<const std::uint16_t> regi
   const std::uint32_t crc = crc32_of_registers(data_id, registers.first(position_reg::crc));
   if (require_crc && get32(registers, position_reg::crc) != crc) return std::nullopt;
   PositionBlock position{get32(registers, position_reg::index), {}};
-  for (std::size_t i = 0; i < reg::value_count; ++i)
-    position.values[i] = static_cast<std::int32_t>(get32(registers, position_reg::values + 2 * i));
+  position.values = get_values(registers, position_reg::values);
   return position;
 }
 
 PositionRegisters encode_position(const PositionBlock& position, std::uint16_t data_id) {
   PositionRegisters r{};
   put32(r, position_reg::index, position.index);
-  for (std::size_t i = 0; i < reg::value_count; ++i)
-    put32(r, position_reg::values + 2 * i, static_cast<std::uint32_t>(position.values[i]));
+  put_values(r, position_reg::values, position.values);
   put32(r, position_reg::crc,
         crc32_of_registers(data_id, std::span<const std::uint16_t>(r).first(position_reg::crc)));
   return r;
@@ -241,8 +249,7 @@ std::optional<TargetBlock> decode_target(std::span<const std::uint16_t> register
   if (get32(registers, target_reg::crc) != crc32_of_registers(data_id, registers.first(target_reg::crc)))
     return std::nullopt;
   TargetBlock target{get32(registers, target_reg::epoch), get32(registers, target_reg::index), {}};
-  for (std::size_t i = 0; i < reg::value_count; ++i)
-    target.values[i] = static_cast<std::int32_t>(get32(registers, target_reg::values + 2 * i));
+  target.values = get_values(registers, target_reg::values);
   return target;
 }
 
@@ -250,8 +257,7 @@ TargetRegisters encode_target(const TargetBlock& target, std::uint16_t data_id) 
   TargetRegisters r{};
   put32(r, target_reg::epoch, target.epoch);
   put32(r, target_reg::index, target.index);
-  for (std::size_t i = 0; i < reg::value_count; ++i)
-    put32(r, target_reg::values + 2 * i, static_cast<std::uint32_t>(target.values[i]));
+  put_values(r, target_reg::values, target.values);
   put32(r, target_reg::crc,
         crc32_of_registers(data_id, std::span<const std::uint16_t>(r).first(target_reg::crc)));
   return r;

@@ -120,13 +120,13 @@ void refuse_contradictions(const Options& options) {
       throw std::invalid_argument("--target body: expected --body, the table of its marks");
     return;
   }
+  if (options.rows < 2 || options.cols < 2 || !(options.pitch_mm > 0))
+    throw std::invalid_argument(
+        concat({"--target ", options.target, ": expected --rows, --cols (2 and more) and --pitch-mm"}));
   if (options.diameter_mm < 0 || options.diameter_mm >= 2 * options.pitch_mm ||
       (options.diameter_mm > 0 && options.target == "chessboard"))
     throw std::invalid_argument(
         "--diameter-mm: expected that of a board's circles, less than their distance");
-  if (options.rows < 2 || options.cols < 2 || !(options.pitch_mm > 0))
-    throw std::invalid_argument(
-        concat({"--target ", options.target, ": expected --rows, --cols (2 and more) and --pitch-mm"}));
   if (options.target == "circles")
     throw std::invalid_argument(
         "--target circles: the board looks the same from two sides or four, so that its frame turns from "

@@ -16,24 +16,12 @@ using test::edge_pixel;
 using test::expose;
 using test::expose_deep;
 using test::GapScene;
+using test::measured;
 using test::paint;
 using test::Picture;
 using test::Pixels;
 using test::problem_of;
 using test::random_gap;
-
-constexpr double noise = 2;
-
-GapResult measured(const GapScene& scene, const Picture& picture, std::mt19937_64& random) {
-  const Pixels pixels = expose(picture, noise, random);
-  GapProblem problem = problem_of(scene);
-  problem.image = pixels.view();
-  return measure_gap(problem);
-}
-
-GapResult measured(const GapScene& scene, std::mt19937_64& random) {
-  return measured(scene, paint(scene), random);
-}
 
 // ---- accuracy
 

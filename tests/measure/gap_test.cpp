@@ -15,6 +15,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using test::expose;
 using test::GapScene;
+using test::measured;
 using test::paint;
 using test::Picture;
 using test::Pixels;
@@ -22,17 +23,6 @@ using test::problem_of;
 using test::random_gap;
 
 constexpr double noise = 2;
-
-GapResult measured(const GapScene& scene, const Picture& picture, std::mt19937_64& random) {
-  const Pixels pixels = expose(picture, noise, random);
-  GapProblem problem = problem_of(scene);
-  problem.image = pixels.view();
-  return measure_gap(problem);
-}
-
-GapResult measured(const GapScene& scene, std::mt19937_64& random) {
-  return measured(scene, paint(scene), random);
-}
 
 // Each edge of its own sense, also both alike.
 TEST(Gap, AnySensesOfTheEdges) {

@@ -144,4 +144,16 @@ Polygon streak(const GapScene& scene, bool frame, double from_mm, double to_mm, 
   return polygon;
 }
 
+GapResult measured(const GapScene& scene, const Picture& picture, std::mt19937_64& random) {
+  constexpr double noise_grey = 2;
+  const Pixels pixels = expose(picture, noise_grey, random);
+  GapProblem problem = problem_of(scene);
+  problem.image = pixels.view();
+  return measure_gap(problem);
+}
+
+GapResult measured(const GapScene& scene, std::mt19937_64& random) {
+  return measured(scene, paint(scene), random);
+}
+
 }  // namespace zeropose::test

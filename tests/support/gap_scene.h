@@ -43,6 +43,10 @@ Picture paint(const GapScene& scene);
 // A problem with a window of 140 x 90 px about the gap; the image is set by the caller.
 GapProblem problem_of(const GapScene& scene);
 
+// Of one exposure, with noise of 2 grey levels drawn anew.
+GapResult measured(const GapScene& scene, const Picture& picture, std::mt19937_64& random);
+GapResult measured(const GapScene& scene, std::mt19937_64& random);
+
 // An irregular blob of about so many px across, and a streak along an edge of the scene.
 Polygon blob(const Eigen::Vector2d& centre_px, double half_px, double grey, std::mt19937_64& random);
 Polygon streak(const GapScene& scene, bool frame, double from_mm, double to_mm, double off_mm,
