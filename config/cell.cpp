@@ -230,20 +230,19 @@ std::filesystem::path calibration_file_of(const std::filesystem::path& path) {
 
 std::vector<CalibratedCamera> cameras_for(const Cell& cell, const Job& job, std::span<const Pose> X_RH) {
   std::vector<CalibratedCamera> cameras = cell.calibration;
-  for (std::size_t i = 0; i < job.positions.size(); ++i) {
-    const HandPosition& position = job.positions[i];
-    const Pose& X_WR = cell.robots.at(cell.hand_of.at(position.camera).value()).X_WR;
-    cameras.push_back(virtual_camera(cell.calibration.at(position.camera),
-                                     X_WR * (X_RH.empty() ? position.X_RH : X_RH[i])));
-    cameras.back().name = camera_name(cell, job, cell.cameras.size() + i);
+  for (const HandEye& eye : hand_eyes(job)) {
+    const Pose& X_WR = cell.robots.at(cell.hand_of.at(eye.camera).value()).X_WR;
+    const Pose& X_RH_there = X_RH.empty() ? job.positions[eye.position].X_RH : X_RH[eye.position];
+    cameras.push_back(virtual_camera(cell.calibration.at(eye.camera), X_WR * X_RH_there));
+    cameras.back().name = camera_name(cell, job, cameras.size() - 1);
   }
   return cameras;
 }
 
 std::string camera_name(const Cell& cell, const Job& job, std::size_t view_camera) {
-  const std::string& device = cell.cameras.at(device_of(job, view_camera, cell.cameras.size())).name;
-  if (view_camera < cell.cameras.size()) return device;
-  return device + " at " + job.positions[view_camera - cell.cameras.size()].name;
+  if (view_camera < cell.cameras.size()) return cell.cameras[view_camera].name;
+  const HandEye eye = hand_eyes(job).at(view_camera - cell.cameras.size());
+  return cell.cameras.at(eye.camera).name + " at " + job.positions[eye.position].name;
 }
 
 std::set<std::string> known_cell_keys() {

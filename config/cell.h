@@ -61,9 +61,9 @@ struct CellText {
 };
 Cell parse_cell(const CellText& text);
 
-// The cameras that a job sees with, as View::camera counts them: the cell's, then one for each of the job's
-// positions with the robot's hand at X_RH, by default where it was taught. A camera on a hand has no place in
-// the world of its own.
+// The cameras that a job sees with, as View::camera counts them: the cell's, then those of each of the job's
+// positions with the robot's hand at X_RH, one per position, by default where it was taught. A camera on a
+// hand has no place in the world of its own.
 std::vector<CalibratedCamera> cameras_for(const Cell& cell, const Job& job, std::span<const Pose> X_RH = {});
 
 // The name of a view's camera.

@@ -89,8 +89,12 @@ void check_requirements(const Cell& cell, const Job& job, const std::string& pat
 
 // A picture from where nothing is looked for would be asked of the robot for nothing.
 void check_positions(const Cell& cell, const Job& job, const std::string& path, JsonReading& reading) {
+  std::set<std::size_t> used;
+  const std::vector<HandEye> eyes = hand_eyes(job);
+  for (const View& view : job.views)
+    if (view.camera >= cell.cameras.size()) used.insert(eyes[view.camera - cell.cameras.size()].position);
   for (std::size_t i = 0; i < job.positions.size(); ++i)
-    if (std::ranges::find(job.views, cell.cameras.size() + i, &View::camera) == job.views.end())
+    if (!used.contains(i))
       reading.add_mistake(path_of(path + ".positions", i) + ".name", in_quotes(job.positions[i].name),
                           "a position that at least one mark names in its cameras");
 }

@@ -90,19 +90,33 @@ ApplicationPoint read_application_point(JsonObject& object) {
   return point;
 }
 
+// The cameras of a position: all on the hand of one robot.
+void read_position_cameras(JsonObject& object, const std::vector<Mounted>& cameras, HandPosition& position) {
+  std::vector<std::string> names;
+  if (!object.read("cameras", names)) return;
+  if (names.empty())
+    object.add_mistake("cameras", "no camera", "the names of cameras with on_hand_of, all of one robot");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const std::string key = path_of("cameras", i);
+    const auto found = std::ranges::find(cameras, names[i], &Mounted::camera);
+    const auto index = static_cast<std::size_t>(found - cameras.begin());
+    if (found == cameras.end() || found->robot.empty())
+      object.add_mistake(key, in_quotes(names[i]), "the name of a camera with on_hand_of");
+    else if (std::ranges::find(position.cameras, index) != position.cameras.end())
+      object.add_mistake(key, in_quotes(names[i]) + " twice", "each camera once");
+    else if (!position.cameras.empty() && cameras[position.cameras.front()].robot != found->robot)
+      object.add_mistake(key, in_quotes(names[i]), "a camera on the same hand as the first one");
+    else
+      position.cameras.push_back(index);
+  }
+}
+
 HandPosition read_position(JsonObject& object, const std::vector<Mounted>& cameras) {
   HandPosition position;
-  std::string camera;
   object.read("name", position.name);
   if (std::ranges::find(cameras, position.name, &Mounted::camera) != cameras.end())
     object.add_mistake("name", in_quotes(position.name), "a name that no camera has");
-  if (object.read("camera", camera)) {
-    const auto found = std::ranges::find(cameras, camera, &Mounted::camera);
-    if (found == cameras.end() || found->robot.empty())
-      object.add_mistake("camera", in_quotes(camera), "the name of a camera with on_hand_of");
-    else
-      position.camera = static_cast<std::size_t>(found - cameras.begin());
-  }
+  read_position_cameras(object, cameras, position);
   object.read("hand_pose", position.X_RH);
   object.read_optional("tolerance_mm", position.tolerance_mm, NumberRange{0, 1000, true});
   object.read_optional("tolerance_deg", position.tolerance_deg, NumberRange{0, 180, true});
@@ -115,7 +129,7 @@ Eyes read_positions(JsonObject& object, const std::vector<Mounted>& cameras, Job
       "positions", [&](JsonObject& member) { job.positions.push_back(read_position(member, cameras)); });
   object.read_optional("positions_within_s", job.positions_within_s, NumberRange{0, 3600, true});
   Eyes eyes = fixed_eyes(cameras);
-  for (const HandPosition& position : job.positions) eyes.push_back(position.name);
+  for (const HandEye& eye : hand_eyes(job)) eyes.push_back(job.positions[eye.position].name);
   return eyes;
 }
 
@@ -154,14 +168,14 @@ void add_views(JsonObject& object, const NamedMark& named, const Eyes& eyes, std
   for (std::size_t i = 0; i < named.cameras.size(); ++i) {
     const std::string& name = named.cameras[i];
     const std::string key = path_of("cameras", i);
-    const auto eye = std::ranges::find(eyes, name);
-    if (eye == eyes.end() || name.empty())
+    if (name.empty() || std::ranges::find(eyes, name) == eyes.end())
       object.add_mistake(key, in_quotes(name), expected);
     else if (std::find(named.cameras.begin(), named.cameras.begin() + static_cast<std::ptrdiff_t>(i), name) !=
              named.cameras.begin() + static_cast<std::ptrdiff_t>(i))
       object.add_mistake(key, in_quotes(name) + " twice", "each camera once");
     else
-      views.push_back({static_cast<std::size_t>(eye - eyes.begin()), index});
+      for (std::size_t eye = 0; eye < eyes.size(); ++eye)
+        if (eyes[eye] == name) views.push_back({eye, index});
   }
 }
 

@@ -16,7 +16,8 @@ struct Mounted {
   std::string camera, robot;
 };
 
-// What a mark can be seen from, in the order of View::camera. Cameras on a hand have no name there.
+// What a mark can be seen from, in the order of View::camera: fixed cameras, and positions by their name,
+// which stands for every camera of the position. Cameras on a hand have no name there.
 using Eyes = std::vector<std::string>;
 Eyes fixed_eyes(const std::vector<Mounted>& cameras);
 

@@ -32,6 +32,10 @@ Frame kept(const Frame& frame) {
   return copy;
 }
 
+TimePoint oldest_of(const std::vector<Frame>& frames) {
+  return std::ranges::min_element(frames, {}, &Frame::received)->received;
+}
+
 }  // namespace
 
 Standing standing_of(const Cell& cell, const Job& job, const Request& request) {
@@ -44,7 +48,7 @@ Standing standing_of(const Cell& cell, const Job& job, const Request& request) {
             fmt::format("position {} is told, job {} has 1 to {}", request.argument, job.name, count), 0};
   const auto index = static_cast<std::size_t>(request.argument - 1);
   const HandPosition& position = job.positions[index];
-  if (cell.hand_of.at(position.camera) != request.robot)
+  if (cell.hand_of.at(position.cameras.front()) != request.robot)
     return {Code::wrong_position,
             fmt::format("{} is a position of another robot than {}", position.name,
                         cell.robots.at(request.robot).name),
@@ -64,15 +68,17 @@ void HandPictures::make_room(std::size_t position, std::uint32_t part, const Pos
   part_ = part;
   Place& place = places_[position];
   const Distance off = distance(place.X_RH, X_RH);
-  if (off.mm > same_hand_mm || off.deg > same_hand_deg) place.frames.clear();
-  if (place.frames.empty()) place.X_RH = X_RH;
-  std::erase_if(place.frames, [&](const Frame& frame) { return frame.received < oldest; });
+  auto& known = place.rounds;
+  if (off.mm > same_hand_mm || off.deg > same_hand_deg) known.clear();
+  if (known.empty()) place.X_RH = X_RH;
+  std::erase_if(known, [&](const auto& frames) { return oldest_of(frames) < oldest; });
   const auto most = static_cast<std::ptrdiff_t>(rounds) - 1;
-  if (std::ssize(place.frames) > most) place.frames.erase(place.frames.begin(), place.frames.end() - most);
+  if (std::ssize(known) > most) known.erase(known.begin(), known.end() - most);
 }
 
-void HandPictures::take(std::size_t position, const Frame& frame) {
-  places_.at(position).frames.push_back(kept(frame));
+void HandPictures::take(std::size_t position, std::span<const Frame> frames) {
+  auto& round = places_.at(position).rounds.emplace_back();
+  for (const Frame& frame : frames) round.push_back(kept(frame));
 }
 
 std::string HandPictures::missing(const Job& job, std::optional<std::uint32_t> part, TimePoint now) const {
@@ -80,8 +86,8 @@ std::string HandPictures::missing(const Job& job, std::optional<std::uint32_t> p
   std::string names;
   for (std::size_t i = 0; i < job.positions.size(); ++i) {
     const auto place = places_.find(i);
-    const bool seen = place != places_.end() && !place->second.frames.empty() && (!part || *part == part_);
-    if (seen && place->second.frames.back().received >= oldest) continue;
+    const bool seen = place != places_.end() && !place->second.rounds.empty() && (!part || *part == part_);
+    if (seen && oldest_of(place->second.rounds.back()) >= oldest) continue;
     names += (names.empty() ? "" : ", ") + job.positions[i].name + (seen ? " (too long ago)" : "");
   }
   return names.empty() ? names : "no picture of this part from " + names;
@@ -91,7 +97,7 @@ std::size_t HandPictures::rounds(const Job& job) const {
   std::size_t least = job.positions.empty() ? 0 : std::numeric_limits<std::size_t>::max();
   for (std::size_t i = 0; i < job.positions.size(); ++i) {
     const auto place = places_.find(i);
-    least = std::min(least, place == places_.end() ? 0 : place->second.frames.size());
+    least = std::min(least, place == places_.end() ? 0 : place->second.rounds.size());
   }
   return least;
 }
@@ -105,8 +111,8 @@ std::vector<Pose> HandPictures::hands(const Job& job) const {
 std::vector<Frame> HandPictures::frames(const Job& job, std::size_t back) const {
   std::vector<Frame> frames;
   for (std::size_t i = 0; i < job.positions.size(); ++i) {
-    const std::vector<Frame>& all = places_.at(i).frames;
-    frames.push_back(all.at(all.size() - 1 - back));
+    const auto& rounds = places_.at(i).rounds;
+    std::ranges::copy(rounds.at(rounds.size() - 1 - back), std::back_inserter(frames));
   }
   return frames;
 }
@@ -117,7 +123,7 @@ std::vector<std::size_t> eyes_of(const Cell& cell, const Job& job) {
     if (view.camera < cell.cameras.size()) eyes.push_back(view.camera);
   std::ranges::sort(eyes);
   eyes.erase(std::unique(eyes.begin(), eyes.end()), eyes.end());
-  for (std::size_t i = 0; i < job.positions.size(); ++i) eyes.push_back(cell.cameras.size() + i);
+  for (std::size_t i = 0; i < hand_eyes(job).size(); ++i) eyes.push_back(cell.cameras.size() + i);
   return eyes;
 }
 
@@ -126,7 +132,7 @@ JobPictures job_pictures(const Cell& cell, const Job& job, Grabber& grabber, con
   JobPictures pictures;
   pictures.code = Code::ok;
   pictures.eyes = eyes_of(cell, job);
-  const std::span fixed(pictures.eyes.begin(), pictures.eyes.end() - std::ssize(job.positions));
+  const std::span fixed(pictures.eyes.begin(), pictures.eyes.end() - std::ssize(hand_eyes(job)));
   if (!fixed.empty()) {
     FrameSet grabbed = grabber.grab_live(fixed, deadline);
     pictures.code = grabbed.code;

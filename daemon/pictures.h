@@ -34,7 +34,7 @@ class HandPictures {
   // them when the hand was elsewhere.
   void make_room(std::size_t position, std::uint32_t part, const Pose& X_RH, TimePoint oldest,
                  std::size_t rounds);
-  void take(std::size_t position, const Frame& frame);
+  void take(std::size_t position, std::span<const Frame> frames);  // of the position's cameras
   void forget() { places_.clear(); }
 
   // Which positions have no picture of this part (none given: of the part that was looked at last) or too old
@@ -43,14 +43,14 @@ class HandPictures {
 
   // How many pictures every position of the job has.
   std::size_t rounds(const Job& job) const;
-  // By position. Preconditions: nothing is missing, back < rounds(). back 0: the newest.
-  std::vector<Pose> hands(const Job& job) const;
-  std::vector<Frame> frames(const Job& job, std::size_t back) const;
+  // Preconditions: nothing is missing, back < rounds(). back 0: the newest.
+  std::vector<Pose> hands(const Job& job) const;                      // by position
+  std::vector<Frame> frames(const Job& job, std::size_t back) const;  // as hand_eyes() counts
 
  private:
   struct Place {
     Pose X_RH = Pose::Identity();
-    std::vector<Frame> frames;  // oldest first
+    std::vector<std::vector<Frame>> rounds;  // oldest first; of each the frames of the position's cameras
   };
   std::uint32_t part_ = 0;
   std::map<std::size_t, Place> places_;  // by position
@@ -66,7 +66,7 @@ struct JobPictures {
   std::optional<std::chrono::nanoseconds> device_spread;
 };
 
-// The fixed cameras of the job, then its positions, as View::camera counts them.
+// The fixed cameras of the job, then those of its positions, as View::camera counts them.
 std::vector<std::size_t> eyes_of(const Cell& cell, const Job& job);
 
 // Grabs the fixed cameras and adds the pictures of the hands, `back` rounds ago.

@@ -32,7 +32,7 @@ struct Mark {
 };
 
 // Camera and mark are indices into the cell's cameras and the job's marks. After the cell's cameras come
-// those on a robot's hand at each of the job's positions.
+// those on a robot's hand: of each of the job's positions one after the other (HandEye).
 struct View {
   std::size_t camera = 0;
   std::size_t mark = 0;
@@ -43,12 +43,12 @@ struct ApplicationPoint {
   Eigen::Vector3d p_O_mm = Eigen::Vector3d::Zero();
 };
 
-// From where a camera on a robot's hand looks at the object (spec 50 M3, virtual cameras).
+// From where cameras on a robot's hand look at the object, all at once (spec 50 M3, virtual cameras).
 struct HandPosition {
   std::string name;
-  std::size_t camera = 0;        // of the cell, on a hand
-  Pose X_RH = Pose::Identity();  // as taught
-  double tolerance_mm = 1;       // how far from there the hand may stand
+  std::vector<std::size_t> cameras{};  // of the cell, on one hand; two are a stereo sensor
+  Pose X_RH = Pose::Identity();        // as taught
+  double tolerance_mm = 1;             // how far from there the hand may stand
   double tolerance_deg = 0.5;
 };
 
@@ -87,9 +87,22 @@ struct Job {
   Requirements requirements;
 };
 
+// A camera at one of the job's positions.
+struct HandEye {
+  std::size_t position = 0, camera = 0;
+};
+
+// All of them, as View::camera counts them after the cell's cameras.
+inline std::vector<HandEye> hand_eyes(const Job& job) {
+  std::vector<HandEye> eyes;
+  for (std::size_t i = 0; i < job.positions.size(); ++i)
+    for (const std::size_t camera : job.positions[i].cameras) eyes.push_back({i, camera});
+  return eyes;
+}
+
 // The camera of the cell that takes the picture of a view, for a cell of so many cameras.
 inline std::size_t device_of(const Job& job, std::size_t view_camera, std::size_t cell_cameras) {
-  return view_camera < cell_cameras ? view_camera : job.positions.at(view_camera - cell_cameras).camera;
+  return view_camera < cell_cameras ? view_camera : hand_eyes(job).at(view_camera - cell_cameras).camera;
 }
 
 // Fewer marks fix no pose, whatever the requirements say.

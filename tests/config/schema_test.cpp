@@ -46,7 +46,7 @@ Json full_example() {
     "path": "pictures", "loop": true})");
   json["cameras"].push_back(parsed(R"({"name": "hand", "driver": "folder", "width_px": 768, "height_px": 572,
     "path": "pictures", "on_hand_of": "robot2"})"));
-  json["jobs"][0]["positions"] = Json::array({parsed(R"({"name": "above", "camera": "hand",
+  json["jobs"][0]["positions"] = Json::array({parsed(R"({"name": "above", "cameras": ["hand"],
     "hand_pose": [0, 0, 0, 0, 0, 0], "tolerance_mm": 1, "tolerance_deg": 0.5})")});
   json["jobs"][0]["positions_within_s"] = 30;
   json["jobs"][0]["marks"][0]["cameras"].push_back("above");

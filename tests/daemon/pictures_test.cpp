@@ -22,7 +22,8 @@ class Hands : public testing::Test {
   void take(std::size_t position, std::uint32_t part, std::uint8_t grey = 1,
             const Pose& X_RH = Pose::Identity()) {
     hands.make_room(position, part, X_RH, TimePoint(50s), 3);
-    hands.take(position, frame(grey));
+    const Frame taken[] = {frame(grey)};
+    hands.take(position, taken);
   }
   static constexpr std::size_t none = 99;
   void take_all_but(std::size_t left_out, std::uint32_t part) {
@@ -87,9 +88,11 @@ TEST_F(Hands, APictureThatFailsLeavesNoneBehind) {
 
 TEST_F(Hands, OldRoundsGo) {
   hands.make_room(0, 0, Pose::Identity(), TimePoint(50s), 3);
-  hands.take(0, frame(1, TimePoint(60s)));
+  const Frame old[] = {frame(1, TimePoint(60s))};
+  hands.take(0, old);
   hands.make_room(0, 0, Pose::Identity(), TimePoint(70s), 3);
-  hands.take(0, frame(2));
+  const Frame fresh[] = {frame(2)};
+  hands.take(0, fresh);
   take_all_but(0, 0);
   EXPECT_EQ(hands.rounds(job), 1u);
   EXPECT_EQ(hands.frames(job, 0)[0].row(0)[0], 2);
