@@ -79,9 +79,8 @@ SurveyDrive survey_of(const Options& options) {
 int run(const Options& options) {
   const StopSignals signals;
   const Cell cell = load_cell(options.cell);
-  SimulatedCell simulated(cell, load_scene(cell, sim_file_of(options.cell)));
-  const Pose X_WO_nominal = simulated.scene().X_WO_nominal;
-  if (!options.shift.empty()) simulated.show(X_WO_nominal * pose_from_text(options.shift));
+  SimulatedCell simulated(cell, load_scenes(cell, sim_file_of(options.cell)));
+  if (!options.shift.empty()) simulated.show(simulated.scene().X_WO_nominal * pose_from_text(options.shift));
   for (const std::string& fault : options.faults) set_fault(simulated, fault);
   std::optional<LineServer> control;
   if (!options.control.empty())
@@ -93,12 +92,18 @@ int run(const Options& options) {
     simulated.move_hand(robot, X_RH);
   };
   if (!options.survey.empty())
-    return drive_survey(cell, survey_of(options),
-                        {[&simulated](const Carried& target) { simulated.show_target(target); }, move_hand},
-                        signals.stopped());
-  if (options.drives)
-    return drive(cell, X_WO_nominal, {[&simulated](const Pose& X_WO) { simulated.show(X_WO); }, move_hand},
+    return drive_survey(
+        cell, survey_of(options),
+        {[&simulated](const Carried& target) { simulated.show_target(target); },
+         [&](std::size_t job) { simulated.show(job, cell.jobs[job].X_WO_nominal); }, move_hand},
+        signals.stopped());
+  if (options.drives) {
+    std::vector<Pose> X_WO0;
+    for (const Job& job : cell.jobs) X_WO0.push_back(job.X_WO_nominal);
+    return drive(cell, X_WO0,
+                 {[&simulated](std::size_t job, const Pose& X_WO) { simulated.show(job, X_WO); }, move_hand},
                  drive_options(options), signals.stopped());
+  }
   signals.stopped().wait(false);
   return 0;
 }

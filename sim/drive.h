@@ -24,6 +24,7 @@ struct DriveOptions {
   int beyond_every = 0;             // every so many parts stands beyond one of the job's limits; 0: none does
   Vector6 max_error = Vector6::Zero();            // of each component of X_O0O, for each part
   double max_error_at_points_mm = 0;              // at every application point; 0: any
+  double max_mounted_mm = 0;                      // of two jobs' objects, once one is mounted in the other
   double robot_max_mm = 100, robot_max_deg = 10;  // the robot's own limits of a correction
   RobotErrors robot;                              // of the hand that carries a camera
   double ready_within_s = 60;                     // from the start to the robot's first "ready"
@@ -37,16 +38,18 @@ bool done_within(double seconds, const std::atomic<bool>& stop, const std::funct
 
 // What the drive moves; both return when every camera shows it so.
 struct DrivenCell {
-  std::function<void(const Pose& X_WO)> show;                          // the object
+  std::function<void(std::size_t job, const Pose& X_WO)> show;         // the job's object
   std::function<void(std::size_t robot, const Pose& X_RH)> move_hand;  // what a robot carries
 };
 
 // Drives the first robot of the cell, and after it those on CAN whose bus there is on this machine; the
-// object stands at X_WO0 when the zero measurement is taken. Prints a line for each part and a summary. Where
-// the job has positions for a camera on the robot's hand, the robot goes through them for every part, and
-// takes the zero measurement itself before the first. Returns the exit status: 0 when every robot got its
-// corrections within the figures, and those beyond a limit the code of that limit instead.
-int drive(const Cell& cell, const Pose& X_WO0, const DrivenCell& driven, const DriveOptions& options,
-          const std::atomic<bool>& stop);
+// objects stand at X_WO0 (one per job) when the zero measurement is taken. Prints a line for each part and a
+// summary. Where a job has positions for cameras on the robot's hand, the robot goes through them for every
+// part, and takes the zero measurements itself before the first. It goes through the cell's jobs one after
+// the other; of two it takes the second one's object and mounts it into the first one's so that their frames
+// coincide, and what is left is told at the application points. Returns the exit status: 0 when every robot
+// got its corrections within the figures, and those beyond a limit the code of that limit instead.
+int drive(const Cell& cell, const std::vector<Pose>& X_WO0, const DrivenCell& driven,
+          const DriveOptions& options, const std::atomic<bool>& stop);
 
 }  // namespace zeropose

@@ -49,10 +49,28 @@ void put_on_hands(const Cell& cell, const Job& job, Scene& scene) {
     if (!cell.hand_of[i]) continue;
     const std::size_t robot = *cell.hand_of[i];
     scene.hand_cameras.push_back({i, robot, cell.robots[robot].X_WR, scene.cameras[i].X_WC});
-    const auto position = std::ranges::find(job.positions, i, &HandPosition::camera);
+    const auto position = std::ranges::find_if(job.positions, [&](const HandPosition& p) {
+      return std::ranges::find(p.cameras, i) != p.cameras.end();
+    });
     const Pose X_RH = position == job.positions.end() ? Pose::Identity() : position->X_RH;
     scene.cameras[i] = virtual_camera(scene.cameras[i], cell.robots[robot].X_WR * X_RH);
   }
+}
+
+Scene scene_of(const Cell& cell, const Job& job, const std::vector<CalibratedCamera>& cameras,
+               const SimFile& truth) {
+  Scene scene;
+  scene.cameras = cameras;
+  scene.marks = job.marks;
+  put_on_hands(cell, job, scene);
+  for (const View& view : job.views)
+    add_view(scene.views, {device_of(job, view.camera, cell.cameras.size()), view.mark});
+  for (const ReferencePoint& point : cell.references.points) scene.fixed_marks.push_back(point.mark);
+  scene.fixed_views = cell.references.views;
+  scene.X_WO_nominal = job.X_WO_nominal;
+  scene.object = truth.object;
+  scene.picture = truth.picture;
+  return scene;
 }
 
 }  // namespace
@@ -65,24 +83,19 @@ std::vector<Mark> marks_seen(const std::vector<Mark>& marks, const std::vector<V
   return seen;
 }
 
-Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
+std::vector<Scene> load_scenes(const Cell& cell, const std::filesystem::path& sim_file) {
   const SimFile truth = load_sim_file(sim_file);
   std::vector<std::string> mistakes;
-  Scene scene;
-  scene.cameras = in_order(cell.cameras, truth.cameras, sim_file.string(), mistakes);
+  const auto cameras = in_order(cell.cameras, truth.cameras, sim_file.string(), mistakes);
   if (cell.jobs.empty()) mistakes.push_back("the cell has no job, expected one whose marks can be rendered");
   if (!mistakes.empty()) throw ConfigError(mistakes);
-  const Job& job = cell.jobs.front();
-  scene.marks = job.marks;
-  put_on_hands(cell, job, scene);
-  for (const View& view : job.views)
-    add_view(scene.views, {device_of(job, view.camera, cell.cameras.size()), view.mark});
-  for (const ReferencePoint& point : cell.references.points) scene.fixed_marks.push_back(point.mark);
-  scene.fixed_views = cell.references.views;
-  scene.X_WO_nominal = job.X_WO_nominal;
-  scene.object = truth.object;
-  scene.picture = truth.picture;
-  return scene;
+  std::vector<Scene> scenes;
+  for (const Job& job : cell.jobs) scenes.push_back(scene_of(cell, job, cameras, truth));
+  return scenes;
+}
+
+Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file) {
+  return load_scenes(cell, sim_file).front();
 }
 
 }  // namespace zeropose

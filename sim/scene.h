@@ -79,8 +79,11 @@ struct Faults {
   std::map<std::string, Pose> moved_cameras{};  // X_CoCn by the camera's name
 };
 
-// The scene of the cell's first job with the truth of the file CELL.sim.json. Throws ConfigError: names file
-// and key path of every mistake, also cameras that only one of both knows.
+// The scenes of the cell's jobs with the truth of the file CELL.sim.json. Throws ConfigError: names file and
+// key path of every mistake, also cameras that only one of both knows.
+std::vector<Scene> load_scenes(const Cell& cell, const std::filesystem::path& sim_file);
+
+// That of the first job.
 Scene load_scene(const Cell& cell, const std::filesystem::path& sim_file);
 
 }  // namespace zeropose

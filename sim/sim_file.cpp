@@ -110,7 +110,23 @@ std::vector<PrintedMark> printed_marks(const std::filesystem::path& file) {
   return marks;
 }
 
-ShownBody read_body(JsonObject& object, const std::filesystem::path& folder, SurveyDrive& survey) {
+// Where the hand goes with the cameras that it carries, or with what they look at.
+void read_hand_poses(JsonObject& object, SurveyDrive& survey) {
+  object.read_each("hand_poses", 3, [&](JsonObject& pose) {
+    Pose X_RH = Pose::Identity();
+    if (pose.read("X_RH", X_RH)) survey.places.push_back(X_RH);
+  });
+}
+
+BallInWorld read_standing_ball(JsonObject& object) {
+  BallInWorld ball;
+  object.read("ball_in_world_mm", ball.p_W_mm, 1e5);
+  object.read("radius_mm", ball.radius_mm, NumberRange{0, 1000, true});
+  object.read("grey", ball.grey, NumberRange{0, 255});
+  return ball;
+}
+
+ShownBody read_body(JsonObject& object, const std::filesystem::path& folder) {
   ShownBody body;
   std::string file;
   if (object.has("board") && object.has("body")) object.add_mistake("body", "a board as well", "one of both");
@@ -121,10 +137,6 @@ ShownBody read_body(JsonObject& object, const std::filesystem::path& folder, Sur
     body.X_HB = X_HB;
   else
     object.read("in_world", body.X_WB);
-  object.read_each("hand_poses", 3, [&](JsonObject& pose) {
-    Pose X_RH = Pose::Identity();
-    if (pose.read("X_RH", X_RH)) survey.places.push_back(X_RH);
-  });
   return body;
 }
 
@@ -133,10 +145,16 @@ SurveyDrive read_survey(JsonObject& object, const std::filesystem::path& folder)
   object.read("camera", survey.camera);
   survey.name = survey.camera;
   object.read_optional("name", survey.name);
+  StandingObject standing;
   if (object.has("board") || object.has("body"))
-    survey.target = read_body(object, folder, survey);
+    survey.target = read_body(object, folder);
+  else if (object.has("ball_in_world_mm"))
+    survey.target = read_standing_ball(object);
+  else if (object.read_optional("object_of", standing.job))
+    survey.target = standing;
   else
     survey.target = read_ball(object, survey);
+  if (!std::holds_alternative<BallInHand>(survey.target)) read_hand_poses(object, survey);
   object.read_optional("robot", [&](JsonObject& robot) { survey.errors = read_errors(robot); });
   return survey;
 }
@@ -151,6 +169,7 @@ DriveOptions read_drive(JsonObject& object) {
   object.read_optional("beyond_every", drive.beyond_every, 0, 1000);
   read_components(object, "max_error", drive.max_error);
   object.read_optional("max_error_at_points_mm", drive.max_error_at_points_mm, NumberRange{0, 1e5});
+  object.read_optional("max_mounted_mm", drive.max_mounted_mm, NumberRange{0, 1e5});
   object.read_optional("robot", [&](JsonObject& robot) { drive.robot = read_errors(robot); });
   object.read_optional("robot_max_mm", drive.robot_max_mm, NumberRange{0, 1e5, true});
   object.read_optional("robot_max_deg", drive.robot_max_deg, NumberRange{0, 180, true});

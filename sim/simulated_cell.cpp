@@ -24,18 +24,21 @@ std::vector<V4l2Server::Served> served_by_v4l2(const std::vector<CameraOptions>&
 
 }  // namespace
 
-CellPictures::CellPictures(const Scene& scene)
-    : noise_sigma_grey_(scene.picture.noise_sigma_grey), clean_(scene.cameras.size()) {
-  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
-    renderers_.emplace_back(scene, i);
-    noise_states_.push_back(scene.picture.seed * 1000 + i);
+CellPictures::CellPictures(std::span<const Scene> scenes)
+    : noise_sigma_grey_(scenes.front().picture.noise_sigma_grey), clean_(scenes.front().cameras.size()) {
+  for (std::size_t i = 0; i < clean_.size(); ++i)
+    noise_states_.push_back(scenes.front().picture.seed * 1000 + i);
+  for (const Scene& scene : scenes) {
+    auto& renderers = renderers_.emplace_back();
+    for (std::size_t i = 0; i < clean_.size(); ++i) renderers.emplace_back(scene, i);
   }
-  show(scene.X_WO_nominal, {});
+  show(0, scenes.front().X_WO_nominal, {});
 }
 
-void CellPictures::show(const Pose& X_WO, const Faults& faults, const std::optional<Carried>& carried) {
+void CellPictures::show(std::size_t scene, const Pose& X_WO, const Faults& faults,
+                        const std::optional<Carried>& carried) {
   std::vector<std::future<Clean>> under_way;
-  for (const CameraRenderer& renderer : renderers_)
+  for (const CameraRenderer& renderer : renderers_.at(scene))
     under_way.push_back(
         std::async(std::launch::async, [&] { return renderer.clean_picture(X_WO, faults, carried); }));
   std::vector<std::shared_ptr<const Clean>> fresh;
@@ -54,8 +57,8 @@ void CellPictures::draw(std::size_t camera, std::span<std::uint8_t> pixels, std:
             pixels);
 }
 
-SimulatedCell::SimulatedCell(const Cell& cell, Scene scene)
-    : scene_(std::move(scene)), X_WO_(scene_.X_WO_nominal), pictures_(scene_) {
+SimulatedCell::SimulatedCell(const Cell& cell, std::vector<Scene> scenes)
+    : scenes_(std::move(scenes)), X_WO_(scenes_.front().X_WO_nominal), pictures_(scenes_) {
   const auto draw = [this](std::size_t camera, std::span<std::uint8_t> pixels, std::size_t first = 0) {
     pictures_.draw(camera, pixels, first);
   };
@@ -78,17 +81,24 @@ GigeServer& SimulatedCell::gige(const char* fault) {
 // A camera on a hand that was moved has moved in the hand.
 void SimulatedCell::render() {
   Faults now = faults_;
-  for (const auto& [camera, X_CoCn] : carried_cameras_) {
-    const auto moved = faults_.moved_cameras.find(camera);
-    now.moved_cameras[camera] = moved == faults_.moved_cameras.end() ? X_CoCn : X_CoCn * moved->second;
+  for (const HandCamera& carried : scene().hand_cameras) {
+    const auto hand = hands_.find(carried.robot);
+    if (hand == hands_.end()) continue;
+    const CalibratedCamera& camera = scene().cameras[carried.camera];
+    const Pose X_CoCn = camera.X_WC.inverse() * carried.X_WR * hand->second * carried.X_HC;
+    const auto moved = faults_.moved_cameras.find(camera.name);
+    now.moved_cameras[camera.name] = moved == faults_.moved_cameras.end() ? X_CoCn : X_CoCn * moved->second;
   }
-  pictures_.show(X_WO_, now, target_);
+  pictures_.show(shown_, X_WO_, now, target_);
   if (gige_) gige_->picture_changed();
   if (v4l2_) v4l2_->picture_changed();
 }
 
-void SimulatedCell::show(const Pose& X_WO) {
+void SimulatedCell::show(const Pose& X_WO) { show(shown_, X_WO); }
+
+void SimulatedCell::show(std::size_t job, const Pose& X_WO) {
   const std::lock_guard lock(mutex_);
+  shown_ = job;
   X_WO_ = X_WO;
   target_.reset();
   render();
@@ -96,11 +106,7 @@ void SimulatedCell::show(const Pose& X_WO) {
 
 void SimulatedCell::move_hand(std::size_t robot, const Pose& X_RH) {
   const std::lock_guard lock(mutex_);
-  for (const HandCamera& hand : scene_.hand_cameras) {
-    if (hand.robot != robot) continue;
-    const CalibratedCamera& camera = scene_.cameras[hand.camera];
-    carried_cameras_[camera.name] = camera.X_WC.inverse() * hand.X_WR * X_RH * hand.X_HC;
-  }
+  hands_[robot] = X_RH;
   render();
 }
 
@@ -123,15 +129,18 @@ Faults SimulatedCell::faults() const {
 }
 
 void SimulatedCell::require_mark(const std::string& mark) const {
-  if (std::ranges::find(scene_.marks, mark, &Mark::name) == scene_.marks.end() &&
-      std::ranges::find(scene_.fixed_marks, mark, &Mark::name) == scene_.fixed_marks.end())
+  const auto has = [&](const std::vector<Mark>& marks) {
+    return std::ranges::find(marks, mark, &Mark::name) != marks.end();
+  };
+  if (std::ranges::none_of(scenes_, [&](const Scene& s) { return has(s.marks) || has(s.fixed_marks); }))
     throw std::invalid_argument("no mark '" + mark + "' in the cell");
 }
 
 std::size_t SimulatedCell::index_of(const std::string& camera) const {
-  const auto found = std::ranges::find(scene_.cameras, camera, &CalibratedCamera::name);
-  if (found == scene_.cameras.end()) throw std::invalid_argument("no camera '" + camera + "' in the cell");
-  return static_cast<std::size_t>(found - scene_.cameras.begin());
+  const auto& cameras = scenes_.front().cameras;
+  const auto found = std::ranges::find(cameras, camera, &CalibratedCamera::name);
+  if (found == cameras.end()) throw std::invalid_argument("no camera '" + camera + "' in the cell");
+  return static_cast<std::size_t>(found - cameras.begin());
 }
 
 bool SimulatedCell::camera_runs(const std::string& camera) const {
@@ -174,7 +183,7 @@ void SimulatedCell::lose_packets(const std::string& camera, double ratio) {
 }
 
 void SimulatedCell::clear_faults() {
-  for (std::size_t i = 0; gige_ && i < scene_.cameras.size(); ++i) {
+  for (std::size_t i = 0; gige_ && i < scenes_.front().cameras.size(); ++i) {
     gige_->start_camera(i);
     gige_->lose_packets(i, 0);
   }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <stdexcept>
 
 #include "measure/code.h"
 #include "sim/drive.h"
@@ -18,8 +19,18 @@ constexpr double room_mm = 50;
 Carried carried_by(const BallInHand& ball, const Pose& X_WH) {
   return CarriedBall{X_WH * ball.p_HT_mm, ball.radius_mm, ball.grey};
 }
+Carried carried_by(const BallInWorld& ball, const Pose&) {
+  return CarriedBall{ball.p_W_mm, ball.radius_mm, ball.grey};
+}
 Carried carried_by(const ShownBody& body, const Pose& X_WH) {
   return CarriedBody{body.X_HB ? Pose(X_WH * *body.X_HB) : body.X_WB, body.marks};
+}
+
+// Throws std::invalid_argument.
+std::size_t job_named(const Cell& cell, const std::string& name) {
+  const auto job = std::ranges::find(cell.jobs, name, &Job::name);
+  if (job == cell.jobs.end()) throw std::invalid_argument("the cell has no job " + name);
+  return static_cast<std::size_t>(job - cell.jobs.begin());
 }
 
 class Surveyor {
@@ -56,9 +67,17 @@ class Surveyor {
     const Pose X_RH_true = errors_.true_hand(position, X_RH);
     const Pose X_WH = cell_.robots.at(survey_.robot).X_WR * X_RH_true;
     surveyed_.move_hand(survey_.robot, X_RH_true);
-    surveyed_.show(std::visit([&](const auto& target) { return carried_by(target, X_WH); }, survey_.target));
+    std::visit([&](const auto& target) { show(target, X_WH); }, survey_.target);
     return robot_.at_position(static_cast<std::uint16_t>(cell_.jobs.front().number), 0,
                               static_cast<std::int32_t>(position + 1), X_RH);
+  }
+
+  void show(const StandingObject& object, const Pose&) {
+    surveyed_.show_object(job_named(cell_, object.job));
+  }
+  template <typename Target>
+  void show(const Target& target, const Pose& X_WH) {
+    surveyed_.show(carried_by(target, X_WH));
   }
 
   const Cell& cell_;

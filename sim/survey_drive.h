@@ -22,6 +22,17 @@ struct BallInHand {
   double radius_mm = 0, grey = 0;
 };
 
+// A ball that stands still; the hand carries the cameras.
+struct BallInWorld {
+  Eigen::Vector3d p_W_mm = Eigen::Vector3d::Zero();
+  double radius_mm = 0, grey = 0;
+};
+
+// The object of a job where it stands ideally; the hand carries the cameras.
+struct StandingObject {
+  std::string job;
+};
+
 // A board or body on the hand; without X_HB it stands still and the hand carries the camera.
 struct ShownBody {
   std::filesystem::path table;     // of a body's marks; empty: a board
@@ -35,14 +46,15 @@ struct SurveyDrive {
   std::string name;       // that of the camera, where it has no other
   std::string camera;     // that it is for
   std::size_t robot = 0;  // of the cell
-  std::variant<BallInHand, ShownBody> target;
+  std::variant<BallInHand, BallInWorld, ShownBody, StandingObject> target;
   std::vector<Pose> places;  // X_RH of the robot's own program
   RobotErrors errors;
 };
 
-// What the robot moves; both return when every camera shows it so.
+// What the robot moves; all return when every camera shows it so.
 struct SurveyedCell {
   std::function<void(const Carried& target)> show;
+  std::function<void(std::size_t job)> show_object;                    // where it stands ideally
   std::function<void(std::size_t robot, const Pose& X_RH)> move_hand;  // what a robot carries
 };
 

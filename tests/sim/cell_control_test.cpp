@@ -23,7 +23,7 @@ class CellControl : public testing::Test {
     return ask(question);
   }
 
-  SimulatedCell cell{load_cell(test::cells + "car-body.json"), test::flat_car_body()};
+  SimulatedCell cell{load_cell(test::cells + "car-body.json"), {test::flat_car_body()}};
 };
 
 TEST_F(CellControl, ShiftMovesTheObject) {

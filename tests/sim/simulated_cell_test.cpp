@@ -27,15 +27,15 @@ double rms(const Frame& a, const Frame& b) {
 // Two frames of the same differ by twice the noise's variance, and that of rounding to grey levels.
 TEST(CellPictures, ShowWhatStandsThereWithNewNoise) {
   const Scene scene = test::flat_car_body();
-  CellPictures pictures(scene);
+  CellPictures pictures({&scene, 1});
   const double noise = std::sqrt(2 * (std::pow(scene.picture.noise_sigma_grey, 2) + 1.0 / 12));
   const Frame nominal = drawn(pictures, scene);
   EXPECT_NEAR(rms(drawn(pictures, scene), nominal), noise, 0.02 * noise);
-  pictures.show(scene.X_WO_nominal * from_six_numbers({10, 10, 10, 0, 0, 0}), {});
+  pictures.show(0, scene.X_WO_nominal * from_six_numbers({10, 10, 10, 0, 0, 0}), {});
   EXPECT_GT(rms(drawn(pictures, scene), nominal), 2 * noise);
-  pictures.show(scene.X_WO_nominal, {});
+  pictures.show(0, scene.X_WO_nominal, {});
   EXPECT_NEAR(rms(drawn(pictures, scene), nominal), noise, 0.02 * noise);
-  pictures.show(scene.X_WO_nominal, {{scene.marks[scene.views.front().mark].name}, {}});
+  pictures.show(0, scene.X_WO_nominal, {{scene.marks[scene.views.front().mark].name}, {}});
   EXPECT_GT(rms(drawn(pictures, scene), nominal), 1.02 * noise);
 }
 
