@@ -22,6 +22,41 @@ std::size_t index_of(CsvTable& table, std::size_t row, std::string_view column, 
   return 0;
 }
 
+// point_of(table, row): the index of the row's point.
+template <typename PointOf>
+std::vector<SensorSighting> read_sightings(const std::filesystem::path& path,
+                                           std::span<const CalibratedCamera> cameras, const NamedPoses* hand,
+                                           PointOf point_of) {
+  CsvColumns columns{{"camera", "point", "u_px", "v_px"}, {"suu", "svv", "suv"}};
+  if (hand) columns.required.push_back("view");
+  CsvTable table = load_csv(path, columns);
+  std::vector<SensorSighting> sightings;
+  for (std::size_t row = 0; row < table.rows(); ++row) {
+    SensorSighting sighting;
+    sighting.point = point_of(table, row);
+    if (hand) {
+      const std::size_t view = index_of(table, row, "view", *hand, &std::pair<std::string, Pose>::first);
+      sighting.view = table.text(row, "view");
+      if (view < hand->size()) sighting.X_RH = (*hand)[view].second;
+    }
+    Observation observation;
+    observation.camera = index_of(table, row, "camera", cameras, &CalibratedCamera::name);
+    observation.u_px = pixel_of(table, row);
+    observation.covariance_px2 = covariance_of(table, row);
+    auto known = std::ranges::find_if(sightings, [&](const SensorSighting& other) {
+      return other.point == sighting.point && other.view == sighting.view;
+    });
+    if (known == sightings.end()) known = sightings.insert(known, sighting);
+    if (std::ranges::find(known->observations, observation.camera, &Observation::camera) !=
+        known->observations.end())
+      table.add_mistake(row, "point", in_quotes(table.text(row, "point")) + " again in this camera",
+                        hand ? "each point once per camera and view" : "each point once per camera");
+    known->observations.push_back(observation);
+  }
+  table.throw_if_wrong();
+  return sightings;
+}
+
 }  // namespace
 
 std::vector<KnownPoint> load_known_points(const std::filesystem::path& path, double sigma_mm) {
@@ -47,34 +82,22 @@ std::vector<SensorSighting> load_sightings(const std::filesystem::path& path,
                                            std::span<const CalibratedCamera> cameras,
                                            std::span<const KnownPoint> points,
                                            const std::optional<NamedPoses>& hand) {
-  CsvColumns columns{{"camera", "point", "u_px", "v_px"}, {"suu", "svv", "suv"}};
-  if (hand) columns.required.push_back("view");
-  CsvTable table = load_csv(path, columns);
-  std::vector<SensorSighting> sightings;
-  for (std::size_t row = 0; row < table.rows(); ++row) {
-    SensorSighting sighting;
-    sighting.point = index_of(table, row, "point", points, &KnownPoint::name);
-    if (hand) {
-      const std::size_t view = index_of(table, row, "view", *hand, &std::pair<std::string, Pose>::first);
-      sighting.view = table.text(row, "view");
-      if (view < hand->size()) sighting.X_RH = (*hand)[view].second;
-    }
-    Observation observation;
-    observation.camera = index_of(table, row, "camera", cameras, &CalibratedCamera::name);
-    observation.u_px = pixel_of(table, row);
-    observation.covariance_px2 = covariance_of(table, row);
-    auto known = std::ranges::find_if(sightings, [&](const SensorSighting& other) {
-      return other.point == sighting.point && other.view == sighting.view;
-    });
-    if (known == sightings.end()) known = sightings.insert(known, sighting);
-    if (std::ranges::find(known->observations, observation.camera, &Observation::camera) !=
-        known->observations.end())
-      table.add_mistake(row, "point", in_quotes(table.text(row, "point")) + " again in this camera",
-                        hand ? "each point once per camera and view" : "each point once per camera");
-    known->observations.push_back(observation);
-  }
-  table.throw_if_wrong();
-  return sightings;
+  return read_sightings(path, cameras, hand ? &*hand : nullptr, [&](CsvTable& table, std::size_t row) {
+    return index_of(table, row, "point", points, &KnownPoint::name);
+  });
+}
+
+NamedSightings load_sightings(const std::filesystem::path& path, std::span<const CalibratedCamera> cameras,
+                              const NamedPoses& hand) {
+  NamedSightings named;
+  named.sightings = read_sightings(path, cameras, &hand, [&](CsvTable& table, std::size_t row) {
+    const std::string name = table.text(row, "point");
+    const auto known = std::ranges::find(named.points, name);
+    if (known != named.points.end()) return static_cast<std::size_t>(known - named.points.begin());
+    named.points.push_back(name);
+    return named.points.size() - 1;
+  });
+  return named;
 }
 
 }  // namespace zeropose

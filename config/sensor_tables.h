@@ -1,4 +1,4 @@
-// The tables of zeropose calibrate sensor (spec 92).
+// The tables of zeropose calibrate sensor and zeropose teach (spec 92).
 #pragma once
 
 #include <filesystem>
@@ -22,5 +22,13 @@ std::vector<SensorSighting> load_sightings(const std::filesystem::path& path,
                                            std::span<const CalibratedCamera> cameras,
                                            std::span<const KnownPoint> points,
                                            const std::optional<NamedPoses>& hand);
+
+// The same of points whose places are not known: the names in the order in which they first appear.
+struct NamedSightings {
+  std::vector<std::string> points;
+  std::vector<SensorSighting> sightings;
+};
+NamedSightings load_sightings(const std::filesystem::path& path, std::span<const CalibratedCamera> cameras,
+                              const NamedPoses& hand);
 
 }  // namespace zeropose

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <thread>
 
 #include "config/cell.h"
@@ -148,7 +149,7 @@ class Cycle {
   void show_target(int after);
   void end_forgotten_survey();
   void forget_survey();
-  FrameSet grab_for(const Request& request, std::size_t camera);
+  FrameSet grab_for(const Request& request, std::span<const std::size_t> cameras);
   // part: whose pictures from hands count; none: of whichever was looked at last.
   MeasureOutcome measure(std::optional<std::uint32_t> part, TimePoint deadline,
                          const std::function<void()>& on_exposed);

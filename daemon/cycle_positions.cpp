@@ -2,6 +2,8 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <array>
+#include <iterator>
 
 #include "daemon/cycle.h"
 
@@ -64,15 +66,14 @@ Cycle::Told Cycle::look_from_hand(const Request& request) {
                                          std::chrono::duration<double>(job.positions_within_s));
   const int rounds = request.part == zero_part ? cell_.zero_frames : 1;
   hands_.make_room(standing.position, request.part, request.X_RH, oldest, static_cast<std::size_t>(rounds));
-  const FrameSet grabbed = grab_for(request, job.positions[standing.position].camera);
-  if (grabbed.code == Code::ok) hands_.take(standing.position, grabbed.frames.front());
+  const FrameSet grabbed = grab_for(request, job.positions[standing.position].cameras);
+  if (grabbed.code == Code::ok) hands_.take(standing.position, grabbed.frames);
   return {grabbed.code, grabbed.reason};
 }
 
 // With the patience of a measurement: the deadline of a position is longer than the watchdog's.
-FrameSet Cycle::grab_for(const Request& request, std::size_t camera) {
+FrameSet Cycle::grab_for(const Request& request, std::span<const std::size_t> cameras) {
   last_progress_ = Clock::now();
-  const std::size_t cameras[] = {camera};
   return grabber_.grab_live(cameras,
                             std::min(request.deadline - compute_reserve, Clock::now() + cell_.deadline));
 }
@@ -88,15 +89,18 @@ Cycle::Told Cycle::told_survey(const Request& request) {
 
 Cycle::Told Cycle::look_for_survey(const Request& request) {
   survey_.robot = request.robot;
-  std::vector<Frame> frames;
-  for (int picture = 0; picture < 2; ++picture) {
-    FrameSet grabbed = grab_for(request, survey_.survey->options().camera);
+  std::vector<std::size_t> cameras;
+  for (const SurveyCamera& camera : survey_.survey->options().cameras) cameras.push_back(camera.index);
+  std::array<std::vector<Frame>, 2> frames;
+  std::array<std::vector<ImageView>, 2> images;
+  for (std::size_t picture = 0; picture < frames.size(); ++picture) {
+    FrameSet grabbed = grab_for(request, cameras);
     if (grabbed.code != Code::ok) return {grabbed.code, std::move(grabbed.reason)};
-    frames.push_back(std::move(grabbed.frames.front()));
+    frames[picture] = std::move(grabbed.frames);
+    std::ranges::transform(frames[picture], std::back_inserter(images[picture]), view_of);
   }
   last_progress_ = Clock::now();
-  SurveyVerdict verdict =
-      survey_.survey->look(request.argument, request.X_RH, view_of(frames[0]), view_of(frames[1]));
+  SurveyVerdict verdict = survey_.survey->look(request.argument, request.X_RH, images[0], images[1]);
   return {verdict.code, std::move(verdict.reason)};
 }
 

@@ -18,21 +18,22 @@ struct Seen {
   std::string reason;  // why there are none
 };
 
-Seen seen(const BallTarget& target, const ImageView& image) {
+Seen seen(const RoundTarget& target, const ImageView& image) {
   MarkSearch search = target.search;
   search.expected_px = {(image.width_px - 1) / 2.0, (image.height_px - 1) / 2.0};
   search.half_window_px = {image.width_px / 2.0, image.height_px / 2.0};
   const AllMarks all = find_all_marks(image, search);
-  if (all.found.empty()) return {{}, "no ball is in sight: " + reason_text(all.nearest, search)};
+  const std::string_view what = search.kind == MarkKind::ball ? "ball" : "disc";
+  if (all.found.empty())
+    return {{}, fmt::format("no {} is in sight: {}", what, reason_text(all.nearest, search))};
   if (all.found.size() > 1)
-    return {
-        {},
-        fmt::format(
-            "{} things in the picture pass for the ball, at {:.0f} {:.0f} and {:.0f} {:.0f} px: cover the "
-            "others, or narrow the limits of its diameter",
-            all.found.size(), all.found[0].u_px.x(), all.found[0].u_px.y(), all.found[1].u_px.x(),
-            all.found[1].u_px.y())};
-  return {{{Eigen::Vector3d::Zero(), all.found[0].u_px, all.found[0].covariance_px2}}, {}};
+    return {{},
+            fmt::format(
+                "{} things in the picture pass for the {}, at {:.0f} {:.0f} and {:.0f} {:.0f} px: cover the "
+                "others, or narrow the limits of its diameter",
+                all.found.size(), what, all.found[0].u_px.x(), all.found[0].u_px.y(), all.found[1].u_px.x(),
+                all.found[1].u_px.y())};
+  return {{{"", Eigen::Vector3d::Zero(), all.found[0].u_px, all.found[0].covariance_px2}}, {}};
 }
 
 Seen seen(const BoardTarget& target, const ImageView& image) {
@@ -47,7 +48,7 @@ Seen seen(const BoardTarget& target, const ImageView& image) {
             board.equivalent_readings)};
   Seen seen;
   for (const BoardPoint& point : board.points)
-    seen.points.push_back({point.p_B_mm, point.u_px, point.covariance_px2, target.radius_mm});
+    seen.points.push_back({"", point.p_B_mm, point.u_px, point.covariance_px2, target.radius_mm});
   return seen;
 }
 
@@ -59,7 +60,8 @@ Seen seen(const BodyTarget& target, const ImageView& image) {
   Seen seen;
   for (const BodyPoint& point : body.points) {
     const BodyMark& mark = target.marks[point.mark];
-    seen.points.push_back({mark.p_B_mm, point.u_px, point.covariance_px2, mark.radius_mm, point.normal_B});
+    seen.points.push_back(
+        {"", mark.p_B_mm, point.u_px, point.covariance_px2, mark.radius_mm, point.normal_B});
   }
   return seen;
 }
@@ -86,6 +88,9 @@ std::string movement(const Seen& first, const Seen& second) {
 }  // namespace
 
 Survey::Survey(const SurveyOptions& options) : options_(options) {
+  if (options.cameras.empty()) throw std::invalid_argument("cameras: found none, expected one or more");
+  if (options.cameras.size() > 1 && std::holds_alternative<BodyTarget>(options.target))
+    throw std::invalid_argument("cameras: found more than one, expected the one that looks at the body");
   if (options.positions < 1 || options.positions > most_positions)
     throw std::invalid_argument(
         fmt::format("positions: found {}, expected 1 to {}", options.positions, most_positions));
@@ -94,19 +99,31 @@ Survey::Survey(const SurveyOptions& options) : options_(options) {
                                             options.targets.size(), options.positions));
 }
 
-SurveyVerdict Survey::look(int position, const Pose& X_RH, const ImageView& first, const ImageView& second) {
+SurveyVerdict Survey::look(int position, const Pose& X_RH, std::span<const ImageView> first,
+                           std::span<const ImageView> second) {
   if (position < 1 || position > options_.positions)
     return {Code::argument_out_of_range,
             fmt::format("position {} is told, the survey has 1 to {}", position, options_.positions)};
-  const auto look_at = [&](const ImageView& image) {
-    return std::visit([&](const auto& target) { return seen(target, image); }, options_.target);
-  };
-  const Seen before = look_at(first), after = look_at(second);
-  for (const Seen* one : {&before, &after})
-    if (one->points.empty()) return {Code::too_few_marks, one->reason};
-  if (std::string moved = movement(before, after); !moved.empty())
-    return {Code::not_standing_still, std::move(moved)};
-  views_[position] = {X_RH, after.points};
+  SurveyView view{X_RH, {}};
+  for (std::size_t i = 0; i < options_.cameras.size(); ++i) {
+    const auto& camera = options_.cameras[i];
+    const auto refused = [&](Code code, const std::string& reason) {
+      return SurveyVerdict{code, options_.cameras.size() > 1 ? camera.name + ": " + reason : reason};
+    };
+    const auto look_at = [&](const ImageView& image) {
+      return std::visit([&](const auto& target) { return seen(target, image); }, options_.target);
+    };
+    const Seen before = look_at(first[i]), after = look_at(second[i]);
+    for (const Seen* one : {&before, &after})
+      if (one->points.empty()) return refused(Code::too_few_marks, one->reason);
+    if (const std::string moved = movement(before, after); !moved.empty())
+      return refused(Code::not_standing_still, moved);
+    for (SurveyPoint point : after.points) {
+      point.camera = camera.name;
+      view.points.push_back(std::move(point));
+    }
+  }
+  views_[position] = std::move(view);
   return {Code::ok, {}};
 }
 

@@ -1,10 +1,12 @@
-// A robot goes through a list of positions, says where its hand is, and at each one a camera looks for a
-// target: what the calibrations that need a robot are made from (spec 40: P2, hand-eye). It only gathers;
-// calibrating is done from what it gathered.
+// A robot goes through a list of positions, says where its hand is, and at each one a camera, or both of a
+// stereo sensor, look for a target: what the calibrations that need a robot and the teaching of an object are
+// made from (spec 40: P1, P2, hand-eye, stereo sensor; spec 50 M2). It only gathers; calibrating is done from
+// what it gathered.
 #pragma once
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -17,8 +19,8 @@
 
 namespace zeropose {
 
-// One ball anywhere in the picture; the search's window is not used.
-struct BallTarget {
+// One ball or flat disc anywhere in the picture; the search's window is not used.
+struct RoundTarget {
   MarkSearch search;
 };
 
@@ -34,9 +36,14 @@ struct BodyTarget {
   BodyProblem problem;
 };
 
+struct SurveyCamera {
+  std::size_t index = 0;  // of the cell
+  std::string name;
+};
+
 struct SurveyOptions {
-  std::size_t camera = 0;  // of the cell
-  std::variant<BallTarget, BoardTarget, BodyTarget> target;
+  std::vector<SurveyCamera> cameras;  // all must see the target; a body is for one
+  std::variant<RoundTarget, BoardTarget, BodyTarget> target;
   int positions = 0;  // the robot counts them from 1
   // Where the hand shall go, X_RH of each position; empty: the robot's own program knows.
   std::vector<Pose> targets{};
@@ -44,7 +51,8 @@ struct SurveyOptions {
 };
 
 struct SurveyPoint {
-  Eigen::Vector3d p_B_mm = Eigen::Vector3d::Zero();  // in the target's frame; of a ball zero
+  std::string camera;
+  Eigen::Vector3d p_B_mm = Eigen::Vector3d::Zero();  // in the target's frame; of a round one zero
   Eigen::Vector2d u_px = Eigen::Vector2d::Zero();
   Eigen::Matrix2d covariance_px2 = Eigen::Matrix2d::Zero();
   double radius_mm = 0;  // of a flat round mark; 0: it is none, or its radius is not known
@@ -69,10 +77,11 @@ class Survey {
 
   const SurveyOptions& options() const { return options_; }
 
-  // Two pictures of one position, taken one after the other, so that a robot that still moves shows. A
-  // position that is told again takes the place of what was there. Codes: argument_out_of_range,
+  // Two pictures of every camera at one position, taken one after the other, so that a robot that still moves
+  // shows. A position that is told again takes the place of what was there. Codes: argument_out_of_range,
   // too_few_marks (the target is not in sight, or more than one), not_standing_still.
-  SurveyVerdict look(int position, const Pose& X_RH, const ImageView& first, const ImageView& second);
+  SurveyVerdict look(int position, const Pose& X_RH, std::span<const ImageView> first,
+                     std::span<const ImageView> second);
 
   const std::map<int, SurveyView>& views() const { return views_; }
   std::vector<int> missing() const;

@@ -18,14 +18,14 @@ std::size_t camera_index(const Cell& cell, const std::string& name) {
   return static_cast<std::size_t>(found - cell.cameras.begin());
 }
 
-BallTarget ball_target(const Json& target) {
+RoundTarget round_target(MarkKind kind, const Json& target) {
   MarkSearch search;
-  search.kind = MarkKind::ball;
+  search.kind = kind;
   search.bright = target.value("bright", false);
   search.min_diameter_px = target.at("min_diameter_px").get<double>();
   search.max_diameter_px = target.at("max_diameter_px").get<double>();
   if (!(search.min_diameter_px > 0 && search.max_diameter_px > search.min_diameter_px))
-    throw std::invalid_argument("the ball's least diameter must be above 0 and below its largest, px");
+    throw std::invalid_argument("the least diameter must be above 0 and below the largest, px");
   return {search};
 }
 
@@ -35,7 +35,7 @@ BoardTarget board_target(const std::string& kind, const Json& target) {
   const auto found = std::ranges::find_if(kinds, [&](BoardKind one) { return kind == name_of(one); });
   if (found == kinds.end())
     throw std::invalid_argument("no target \"" + kind +
-                                "\"; there are ball, body, circles, asymmetric-circles, chessboard");
+                                "\"; there are ball, disc, body, circles, asymmetric-circles, chessboard");
   problem.kind = *found;
   problem.rows = target.at("rows").get<int>();
   problem.cols = target.at("cols").get<int>();
@@ -61,7 +61,8 @@ BodyTarget body_target(const CameraModel& camera, const Json& marks) {
 Json point_json(const SurveyPoint& point) {
   const Eigen::Matrix2d& S = point.covariance_px2;
   const Eigen::Vector3d& n = point.normal_B;
-  return {{"x_mm", point.p_B_mm.x()},
+  return {{"camera", point.camera},
+          {"x_mm", point.p_B_mm.x()},
           {"y_mm", point.p_B_mm.y()},
           {"z_mm", point.p_B_mm.z()},
           {"u_px", point.u_px.x()},
@@ -101,14 +102,19 @@ std::vector<Pose> targets_of(const RobotOptions& robot, const Json& poses) {
 
 SurveyOptions survey_options(const Cell& cell, const Json& question) {
   SurveyOptions options;
-  options.camera = camera_index(cell, question.at("camera").get<std::string>());
+  for (const auto& name : question.at("cameras").get<std::vector<std::string>>())
+    options.cameras.push_back({camera_index(cell, name), name});
+  if (options.cameras.empty()) throw std::invalid_argument("no camera is named");
   options.positions = question.at("positions").get<int>();
   const Json& target = question.at("target");
   const auto kind = target.at("kind").get<std::string>();
   if (kind == "ball")
-    options.target = ball_target(target);
+    options.target = round_target(MarkKind::ball, target);
+  else if (kind == "disc")
+    options.target = round_target(MarkKind::disc, target);
   else if (kind == "body")
-    options.target = body_target(cell.calibration.at(options.camera).model, target.at("marks"));
+    options.target =
+        body_target(cell.calibration.at(options.cameras.front().index).model, target.at("marks"));
   else
     options.target = board_target(kind, target);
   if (!question.contains("targets")) return options;

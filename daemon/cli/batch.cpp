@@ -24,6 +24,7 @@
 #include "daemon/cli/network.h"
 #include "daemon/cli/plan.h"
 #include "daemon/cli/recalibrate.h"
+#include "daemon/cli/teach.h"
 #include "daemon/cli/triangulate.h"
 #include "daemon/cli/verify.h"
 #include "measure/pose.h"
@@ -291,6 +292,7 @@ void add_batch_verbs(cli::Verb app, int& exit_status) {
   add_network(app, exit_status);
   add_plan(app, exit_status);
   add_triangulate(app, exit_status);
+  add_teach(app, exit_status);
   add_verify(app, exit_status);
   add_recalibrate(app, exit_status);
   add_calibration(app, exit_status);

@@ -32,10 +32,10 @@ Exit status: 0 done, 1 the points cannot give an answer (status and reason say w
 unreadable input.)";
 
 struct Options {
-  std::string cameras, points, observations, robot, report;
+  std::string cameras, points, observations, robot, report, output;
   std::optional<std::string> active;
   double sigma_mm = KnownPoint{}.sigma_mm;
-  bool json = false;
+  bool replace = false, json = false;
 };
 
 struct Input {
@@ -100,10 +100,20 @@ std::string sensor_text(const Input& input, const SensorResult& result, const ch
   return text.str();
 }
 
+// The cameras where the sensor is, ready for `zeropose calibration activate`.
+std::vector<CalibratedCamera> placed(std::vector<CalibratedCamera> cameras, const Pose& X_AS, bool on_hand) {
+  for (CalibratedCamera& camera : cameras) {
+    camera.X_WC = X_AS * camera.X_WC;
+    camera.on_hand = on_hand;
+  }
+  return cameras;
+}
+
 Answer calibrate(const Options& options) {
   Input input;
   input.cameras = load_cameras(options.cameras);
   input.points = load_known_points(options.points, options.sigma_mm);
+  if (!options.output.empty()) refuse_existing(options.output, options.replace);
   std::optional<NamedPoses> hand;
   if (!options.robot.empty()) hand = load_named_poses(options.robot);
   input.sightings = load_sightings(options.observations, input.cameras, input.points, hand);
@@ -112,6 +122,8 @@ Answer calibrate(const Options& options) {
   const SensorResult result = calibrate_sensor(problem);
   const char* pose = hand ? "X_HS" : "X_WS";
   const bool good = result.fit.status == FrameFitStatus::ok;
+  if (good && !options.output.empty())
+    replace_file(options.output, cameras_text(placed(input.cameras, result.fit.X_AB, hand.has_value())));
   Answer answer{good ? done : no_answer, sensor_json(input, result, pose), sensor_text(input, result, pose)};
   if (good && !options.report.empty())
     write_page(options.report,
@@ -137,6 +149,8 @@ void add_calibrate_sensor(cli::Verb calibrate_verb, int& exit_status) {
   verb.add_option("--robot", options->robot, "CSV: view x_mm y_mm z_mm rx_deg ry_deg rz_deg, X_RH");
   verb.add_option("--sigma-mm", options->sigma_mm, "of one coordinate of a known point (0.02)")
       .range(1e-6, 100.0);
+  verb.add_option("--output", options->output, "JSON of the cameras with X_WC or X_HC to write");
+  verb.add_flag("--replace", options->replace, "overwrite --output; the old file is kept as .previous");
   const VerbOption report =
       verb.add_option("--report", options->report, "the report as a page (SVG) to write");
   verb.add_option("--active", options->active, "x,y,z,rx,ry,rz in use, for the report to compare with")

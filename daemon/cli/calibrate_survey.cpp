@@ -33,6 +33,7 @@ each one the camera takes two pictures and looks for the target; the robot is an
 does not count (the target is out of sight, hidden, twice there, or still moving), and may tell it again. No position
 is lost: what was gathered when the time is up, or at Ctrl-C, is written too.
   --target ball      one ball anywhere in the picture: ball grids. Then: zeropose calibrate ball
+  --target disc      one flat disc: the marks of a new object, one at each position. Then: zeropose teach
   --target circles, asymmetric-circles, chessboard
                      a board of --rows --cols --pitch-mm: hand-eye. Then: zeropose calibrate hand-eye. It must look
                      different from every side: asymmetric circles with an odd number of rows. --diameter-mm of its
@@ -40,7 +41,9 @@ is lost: what was gathered when the time is up, or at Ctrl-C, is written too.
   --target body      a calibration body, --body table.csv (zeropose find-body --help): hand-eye without a laser tracker,
                      and from one position with control marks its points for calibrate points
 Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards and bodies also x_mm
-y_mm z_mm, and with a radius radius_mm nx ny nz).
+y_mm z_mm, and with a radius radius_mm nx ny nz). With both cameras of a stereo sensor, --camera left,right, each
+position needs the target in both; --points then has the camera, and of balls and discs the name of the point: "ball",
+or "mark" and the position, or what --marks says (one name per position; the same name again is the same mark).
 The robot's own program knows the positions; or, with --drive ROBOT, the daemon tells it where to go, one position
 after the other (target block, docs/modbus.md): --targets file.csv (view x_mm .. rz_deg: X_RH; counted from 1), or a grid of 3 x 3 x 3
 from --first in steps of --step along the base's axes, or with --along-hand the hand's. The robot moves only inside its
@@ -54,7 +57,8 @@ Exit status: 0 all positions, 1 the time was up before (the files hold what ther
 
 struct Options {
   std::string socket = default_control_socket().string();
-  std::string camera, target = "ball", body, robot, points;
+  std::string target = "ball", body, robot, points;
+  std::vector<std::string> cameras, marks;
   std::string drive, targets;
   std::optional<std::string> first, step;
   bool along_hand = false;
@@ -63,6 +67,8 @@ struct Options {
   double radius_mm = 0;
   bool bright = false, replace = false, json = false;
 };
+
+bool is_round(const Options& options) { return options.target == "ball" || options.target == "disc"; }
 
 Json ask_daemon(const Options& options, const Json& question) {
   Json answer = Json::parse(ask(options.socket, question.dump(), 30s));
@@ -81,8 +87,8 @@ Json marks_of(const Options& options) {
 }
 
 Json target_of(const Options& options) {
-  if (options.target == "ball")
-    return {{"kind", "ball"},
+  if (is_round(options))
+    return {{"kind", options.target},
             {"bright", options.bright},
             {"min_diameter_px", options.min_diameter_px},
             {"max_diameter_px", options.max_diameter_px}};
@@ -109,10 +115,15 @@ void tell_progress(const Json& now, std::size_t& told, std::string& problem) {
 void refuse_contradictions(const Options& options) {
   if (options.robot == options.points)
     throw std::invalid_argument("--robot and --points: expected two files");
-  if (options.target == "ball") {
+  if (options.cameras.size() > 1 && options.target == "body")
+    throw std::invalid_argument("--target body: expected one camera");
+  if (!options.marks.empty() && (options.target != "disc" || options.cameras.size() < 2))
+    throw std::invalid_argument("--marks: expected --target disc and the two cameras of a stereo sensor");
+  if (is_round(options)) {
     if (!(options.min_diameter_px > 0 && options.max_diameter_px > options.min_diameter_px))
       throw std::invalid_argument(
-          "--target ball: expected --min-diameter-px above 0 and a larger --max-diameter-px");
+          concat({"--target ", options.target,
+                  ": expected --min-diameter-px above 0 and a larger --max-diameter-px"}));
     return;
   }
   if (options.target == "body") {
@@ -220,17 +231,26 @@ bool has_radii(const Json& views) {
   return true;
 }
 
-std::string points_table(const Json& views, bool ball) {
+// Of what a stereo sensor saw: which round thing it is.
+std::string point_name(const Options& options, std::size_t position) {
+  if (options.target == "ball") return "ball";
+  return options.marks.empty() ? concat({"mark", std::to_string(position)}) : options.marks.at(position - 1);
+}
+
+std::string points_table(const Json& views, const Options& options) {
+  const bool round = is_round(options), stereo = options.cameras.size() > 1;
   std::vector<std::string> columns{"u_px", "v_px", "suu", "svv", "suv"};
-  if (!ball) columns.insert(columns.begin(), {"x_mm", "y_mm", "z_mm"});
-  if (!ball && has_radii(views)) columns.insert(columns.end(), {"radius_mm", "nx", "ny", "nz"});
+  if (!round) columns.insert(columns.begin(), {"x_mm", "y_mm", "z_mm"});
+  if (!round && has_radii(views)) columns.insert(columns.end(), {"radius_mm", "nx", "ny", "nz"});
   std::ostringstream text;
-  text << "view" << std::setprecision(10);
+  text << "view" << (stereo ? ",camera" : "") << (stereo && round ? ",point" : "") << std::setprecision(10);
   for (const std::string& column : columns) text << ',' << column;
   text << '\n';
   for (const Json& view : views)
     for (const Json& point : view["points"]) {
       text << view["position"];
+      if (stereo) text << ',' << point["camera"].get<std::string>();
+      if (stereo && round) text << ',' << point_name(options, view["position"].get<std::size_t>());
       for (const std::string& column : columns) text << ',' << point[column].get<double>();
       text << '\n';
     }
@@ -243,8 +263,12 @@ Answer survey(const Options& options) {
   const std::vector<Pose> targets = targets_of(options);
   const std::size_t positions =
       targets.empty() ? static_cast<std::size_t>(options.positions) : targets.size();
+  if (!options.marks.empty() && options.marks.size() != positions)
+    throw std::invalid_argument(
+        concat({"--marks: found ", std::to_string(options.marks.size()), " names, expected one for each of ",
+                std::to_string(positions), " positions"}));
   Json question{{"cmd", "survey-start"},
-                {"camera", options.camera},
+                {"cameras", options.cameras},
                 {"positions", positions},
                 {"target", target_of(options)}};
   if (!targets.empty()) question["robot"] = options.drive;
@@ -254,7 +278,7 @@ Answer survey(const Options& options) {
             << positions << " positions\n";
   const Json all = gathered(options, running.number());
   replace_file(options.robot, robot_table(all["views"]));
-  replace_file(options.points, points_table(all["views"], options.target == "ball"));
+  replace_file(options.points, points_table(all["views"], options));
   std::string missing;
   for (const Json& position : all["missing"])
     missing += concat({missing.empty() ? "" : ", ", position.dump()});
@@ -281,7 +305,12 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   const Verb verb =
       calibrate.add_subcommand("survey", "Gathers what a camera sees at positions that a robot tells");
   verb.add_option("--socket", options->socket, "the daemon's Unix socket").shows_default();
-  verb.add_option("--camera", options->camera, "name of the camera in the cell").required();
+  verb.add_option("--camera", options->cameras,
+                  "name of the camera in the cell; of a stereo sensor left,right")
+      .delimiter(',')
+      .required();
+  verb.add_option("--marks", options->marks, "names of the discs that a stereo sensor sees, one per position")
+      .delimiter(',');
   verb.add_option("--positions", options->positions,
                   "how many positions the robot's own program goes through")
       .range(1, 1000);
@@ -293,10 +322,10 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   verb.add_flag("--along-hand", options->along_hand, "the steps run along the axes of the hand");
   verb.add_option("--target", options->target, "what is looked for")
       .shows_default()
-      .one_of({"ball", "body", "circles", "asymmetric-circles", "chessboard"});
-  verb.add_flag("--bright", options->bright, "the ball is brighter than what surrounds it");
-  verb.add_option("--min-diameter-px", options->min_diameter_px, "of the ball's image");
-  verb.add_option("--max-diameter-px", options->max_diameter_px, "of the ball's image");
+      .one_of({"ball", "disc", "body", "circles", "asymmetric-circles", "chessboard"});
+  verb.add_flag("--bright", options->bright, "the ball or disc is brighter than what surrounds it");
+  verb.add_option("--min-diameter-px", options->min_diameter_px, "of the image of the ball or disc");
+  verb.add_option("--max-diameter-px", options->max_diameter_px, "of the image of the ball or disc");
   verb.add_option("--rows", options->rows, "of a board");
   verb.add_option("--cols", options->cols, "of a board");
   verb.add_option("--pitch-mm", options->pitch_mm, "of a board");

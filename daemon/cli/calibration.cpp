@@ -74,10 +74,7 @@ Answer history_of(const Options& options) {
 
 // The camera of the file in the place of the cell's.
 CalibratedCamera replacement(const Options& options, const CalibratedCamera& active) {
-  const CameraFile file = load_camera(options.from, "");
-  if (!file.camera.name.empty() && file.camera.name != active.name)
-    throw ConfigError({concat({options.from, ": found camera ", in_quotes(file.camera.name), ", expected ",
-                               in_quotes(active.name), ": the camera that it takes the place of"})});
+  const CameraFile file = load_camera(options.from, active.name);
   if (!file.has_pose && !options.internals_only)
     throw ConfigError({concat({options.from, ": found no pose, expected ", active.on_hand ? "X_HC" : "X_WC",
                                "; with --internals-only the camera keeps the pose it has"})});

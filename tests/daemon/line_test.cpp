@@ -164,7 +164,7 @@ TEST_F(Line, MovedCameraIsNamedAndPutBackItCountsAgain) {
 TEST_F(Line, ATargetLivesAsLongAsItsSurvey) {
   start_all();
   const Json start = {{"cmd", "survey-start"},
-                      {"camera", "camera1"},
+                      {"cameras", {"camera1"}},
                       {"target", {{"kind", "ball"}, {"min_diameter_px", 300}, {"max_diameter_px", 400}}},
                       {"positions", 2},
                       {"robot", "robot1"},

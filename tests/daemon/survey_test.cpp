@@ -16,14 +16,20 @@ using testing::HasSubstr;
 
 constexpr double noise = 2;
 
+// Of a survey with one camera.
+SurveyVerdict look_once(Survey& survey, int position, const Pose& X_RH, const ImageView& first,
+                        const ImageView& second) {
+  return survey.look(position, X_RH, {&first, 1}, {&second, 1});
+}
+
 class BallSurvey : public testing::Test {
  protected:
   static SurveyOptions options() {
-    BallTarget ball;
+    RoundTarget ball;
     ball.search.kind = MarkKind::ball;
     ball.search.min_diameter_px = 20;
     ball.search.max_diameter_px = 60;
-    return {2, ball, 3};
+    return {{{2, "camera3"}}, ball, 3};
   }
   test::Pixels picture(const std::vector<Vector2d>& balls_px) {
     test::Drawing drawing;
@@ -35,7 +41,7 @@ class BallSurvey : public testing::Test {
   SurveyVerdict look_at(int position, const Balls& first, const Balls& second,
                         const Pose& X_RH = Pose::Identity()) {
     const test::Pixels a = picture(first), b = picture(second);
-    return survey.look(position, X_RH, a.view(), b.view());
+    return look_once(survey, position, X_RH, a.view(), b.view());
   }
   SurveyVerdict look(int position, const Vector2d& ball, const Pose& X_RH = Pose::Identity()) {
     return look_at(position, {ball}, {ball}, X_RH);
@@ -69,6 +75,24 @@ TEST_F(BallSurvey, GoesOnWithTheNextThatIsMissingAndThenFromTheStart) {
   EXPECT_EQ(survey.next_after(3), 2);
   look(2, {100, 100});
   EXPECT_EQ(survey.next_after(2), 0);
+}
+
+TEST_F(BallSurvey, OfAStereoSensorNeedsTheBallInBothPictures) {
+  SurveyOptions both = options();
+  both.cameras.push_back({3, "camera4"});
+  Survey stereo(both);
+  const test::Pixels here = picture({{100, 100}}), there = picture({{180, 90}}), nowhere = picture({});
+  const ImageView good[] = {here.view(), there.view()}, half[] = {here.view(), nowhere.view()};
+  const SurveyVerdict verdict = stereo.look(1, Pose::Identity(), good, half);
+  EXPECT_EQ(verdict.code, Code::too_few_marks);
+  EXPECT_THAT(verdict.reason, HasSubstr("camera4: no ball is in sight"));
+  EXPECT_TRUE(stereo.views().empty());
+  ASSERT_EQ(stereo.look(1, Pose::Identity(), good, good).code, Code::ok);
+  const std::vector<SurveyPoint>& points = stereo.views().at(1).points;
+  ASSERT_EQ(points.size(), 2u);
+  EXPECT_EQ(points[0].camera, "camera3");
+  EXPECT_EQ(points[1].camera, "camera4");
+  EXPECT_LT((points[1].u_px - Vector2d(180, 90)).norm(), 0.1);
 }
 
 TEST_F(BallSurvey, HasATargetForEveryPositionOrNone) {
@@ -126,12 +150,12 @@ test::BoardScene board(BoardKind kind, int rows) {
 SurveyVerdict look_at(const test::BoardScene& scene, Survey& survey) {
   std::mt19937_64 random(3);
   const test::Pixels picture = test::expose(test::paint(scene), noise, random);
-  return survey.look(1, Pose::Identity(), picture.view(), picture.view());
+  return look_once(survey, 1, Pose::Identity(), picture.view(), picture.view());
 }
 
 TEST(BoardSurvey, TakesABoardThatLooksDifferentFromEverySide) {
   const test::BoardScene scene = board(BoardKind::asymmetric_circles, 7);
-  Survey survey({0, BoardTarget{scene.problem()}, 1});
+  Survey survey({{{0, "camera1"}}, BoardTarget{scene.problem()}, 1});
   const SurveyVerdict verdict = look_at(scene, survey);
   ASSERT_EQ(verdict.code, Code::ok) << verdict.reason;
   EXPECT_EQ(survey.views().at(1).points.size(), 42u);
@@ -141,16 +165,17 @@ TEST(BoardSurvey, ABoardThatTurnsAboutItsMiddleMoves) {
   const test::BoardScene scene = board(BoardKind::asymmetric_circles, 7);
   test::BoardScene turned = scene;
   turned.X_CB = test::board_pose(scene, 500, 0.3, 0.4, 0.212);
-  Survey survey({0, BoardTarget{scene.problem()}, 1});
+  Survey survey({{{0, "camera1"}}, BoardTarget{scene.problem()}, 1});
   std::mt19937_64 random(3);
   const test::Pixels first = test::expose(test::paint(scene), noise, random),
                      second = test::expose(test::paint(turned), noise, random);
-  EXPECT_EQ(survey.look(1, Pose::Identity(), first.view(), second.view()).code, Code::not_standing_still);
+  EXPECT_EQ(look_once(survey, 1, Pose::Identity(), first.view(), second.view()).code,
+            Code::not_standing_still);
 }
 
 TEST(BoardSurvey, RefusesABoardWhoseFrameMayTurn) {
   const test::BoardScene scene = board(BoardKind::circles, 7);
-  Survey survey({0, BoardTarget{scene.problem()}, 1});
+  Survey survey({{{0, "camera1"}}, BoardTarget{scene.problem()}, 1});
   const SurveyVerdict verdict = look_at(scene, survey);
   EXPECT_EQ(verdict.code, Code::too_few_marks);
   EXPECT_THAT(verdict.reason, HasSubstr("the board looks the same from 2 sides"));
@@ -162,11 +187,11 @@ TEST(BodySurvey, KeepsEveryMarkWithItsPlaceAndItsPlane) {
   BodyTarget body;
   body.marks = test::published_body(scene.radius_mm, true);
   body.problem.camera = scene.camera;
-  Survey survey({0, body, 1});
+  Survey survey({{{0, "camera1"}}, body, 1});
   const test::Pixels first = test::photograph(scene);
   scene.seed = 2;
   const test::Pixels second = test::photograph(scene);
-  const SurveyVerdict verdict = survey.look(1, Pose::Identity(), first.view(), second.view());
+  const SurveyVerdict verdict = look_once(survey, 1, Pose::Identity(), first.view(), second.view());
   ASSERT_EQ(verdict.code, Code::ok) << verdict.reason;
   const std::vector<SurveyPoint>& points = survey.views().at(1).points;
   EXPECT_GE(points.size(), 40u);
@@ -182,10 +207,10 @@ TEST(BodySurvey, KeepsEveryMarkWithItsPlaceAndItsPlane) {
 TEST(BodySurvey, WithoutABodyInSightSaysSo) {
   BodyTarget body;
   body.marks = test::published_body(8, true);
-  Survey survey({0, body, 1});
+  Survey survey({{{0, "camera1"}}, body, 1});
   const std::vector<std::uint8_t> grey(768 * 572, 120);
   const ImageView empty{grey.data(), 768, 572, 768};
-  const SurveyVerdict verdict = survey.look(1, Pose::Identity(), empty, empty);
+  const SurveyVerdict verdict = look_once(survey, 1, Pose::Identity(), empty, empty);
   EXPECT_EQ(verdict.code, Code::too_few_marks);
   EXPECT_THAT(verdict.reason, HasSubstr("the body is not found"));
 }
