@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -9,7 +10,9 @@
 #include "daemon/cli/answer.h"
 #include "daemon/cli/calibrate.h"
 #include "daemon/cli/calibrate_help.h"
+#include "daemon/cli/camera_report.h"
 #include "daemon/cli/convert.h"
+#include "daemon/cli/output.h"
 
 namespace zeropose {
 namespace {
@@ -17,7 +20,7 @@ namespace {
 using namespace cli;
 
 struct VanishingOptions {
-  std::string pairs, corners;
+  std::string pairs, corners, report;
   std::optional<std::string> origin, focal, near;
   std::optional<double> ratio, side_mm;
   std::size_t first = 0;
@@ -119,6 +122,24 @@ std::string text_of(const Json& json) {
   return text.str();
 }
 
+// The images of the report, the skipped ones last.
+std::vector<RectangleLine> lines_of(const Json& answer, const PairSource& source) {
+  std::vector<RectangleLine> lines;
+  const auto skipped = [&](const std::string& name) {
+    return std::ranges::any_of(source.skipped, [&](const Json& one) { return one["image"] == name; });
+  };
+  if (answer.contains("poses")) {
+    for (const Json& pose : answer["poses"])
+      if (!skipped(pose["image"]))
+        lines.push_back({pose["image"], pose["reason"], pose["ratio_seen"], pose["rms_px"]});
+  } else {
+    for (const std::string& name : source.names)
+      if (!skipped(name)) lines.push_back({name, {}});
+  }
+  for (const Json& one : source.skipped) lines.push_back({one["image"], one["reason"]});
+  return lines;
+}
+
 Answer calibrate_vanishing(const VanishingOptions& options) {
   PairSource source = source_of(options);
   const VanishingResult result = calibrate_by_vanishing_points(problem_of(options, source));
@@ -147,6 +168,11 @@ Answer calibrate_vanishing(const VanishingOptions& options) {
     answer.json["poses"] = poses_json(options, source, camera);
   }
   answer.text = text_of(answer.json);
+  if (!options.report.empty())
+    write_page(options.report,
+               vanishing_report(result, lines_of(answer.json, source),
+                                concat({"Images: ", options.pairs, options.corners})),
+               answer);
   return answer;
 }
 
@@ -169,6 +195,7 @@ void add_calibrate_vanishing(cli::Verb calibrate, int& exit_status) {
   verb.add_option("--near", options->near, "CX,CY about: where two origins fit (the image centre)");
   verb.add_option("--width", options->width_px, "of the image, px").range(1, 65535);
   verb.add_option("--height", options->height_px, "of the image, px").range(1, 65535);
+  verb.add_option("--report", options->report, "the report as a page (SVG) to write");
   verb.add_flag("--one-focal", options->one_focal, "fx = fy");
   verb.add_flag("--json", options->json,
                 "one JSON object on stdout: status, reason, fx fy cx cy, used, skipped, condition, poses");

@@ -11,6 +11,7 @@
 #include "config/cell.h"
 #include "config/recalibration_tables.h"
 #include "daemon/cli/answer.h"
+#include "daemon/cli/camera_report.h"
 #include "daemon/cli/measured_references.h"
 #include "daemon/cli/output.h"
 #include "measure/proposal.h"
@@ -47,7 +48,7 @@ Exit status: 0 done, 1 the points cannot give an answer (status and reason say w
 unreadable input.)";
 
 struct RecalibrateOptions {
-  std::string method, camera, name, before, after, points, cell, measured, output;
+  std::string method, camera, name, before, after, points, cell, measured, output, report;
   double sigma_px = 0;
   bool replace = false, json = false;
 };
@@ -209,6 +210,12 @@ void refuse_strangers(RecalibrationResult& result) {
               " px (root mean square): is this the camera, and are these its points, in mm of the world?"});
 }
 
+std::string source_of(const RecalibrateOptions& options) {
+  if (!options.cell.empty()) return concat({"Cell: ", options.cell, ". Measured: ", options.measured});
+  return concat({"Camera: ", options.camera, ". Before: ", options.before, ". After: ", options.after,
+                 options.points.empty() ? "" : ". Points: ", options.points});
+}
+
 Answer recalibrate_camera(const RecalibrateOptions& options) {
   if (options.cell.empty() == options.camera.empty())
     throw std::invalid_argument(
@@ -229,8 +236,12 @@ Answer recalibrate_camera(const RecalibrateOptions& options) {
   refuse_strangers(result);
   if (result.code == Code::ok && !options.output.empty())
     write_moved_camera(options.output, knock.camera, result.X_WCn);
-  return {result.code == Code::ok ? done : no_answer, answer_json(problem, result),
-          answer_text(problem, result)};
+  Answer answer{result.code == Code::ok ? done : no_answer, answer_json(problem, result),
+                answer_text(problem, result)};
+  if (result.code == Code::ok && !options.report.empty())
+    write_page(options.report, recalibration_report(problem, result, options.name, source_of(options)),
+               answer);
+  return answer;
 }
 
 }  // namespace
@@ -248,6 +259,7 @@ void add_recalibrate(cli::Verb app, int& exit_status) {
   verb.add_option("--name", options->name, "of the camera, where the file holds several");
   verb.add_option("--output", options->output, "camera JSON to write, for zeropose calibration activate");
   verb.add_flag("--replace", options->replace, "overwrite --output");
+  verb.add_option("--report", options->report, "the report as a page (SVG) to write");
   const VerbOption before =
       verb.add_option("--before", options->before, "CSV: point [group] u_px v_px before it was moved");
   const VerbOption after = verb.add_option("--after", options->after, "CSV: the same points after");

@@ -10,7 +10,7 @@ import sys
 import unittest
 import xml.dom.minidom
 
-from program import Case, run, run_json
+from program import Case, page_texts, run, run_json
 
 SOURCE = pathlib.Path(sys.argv[2])
 
@@ -328,8 +328,13 @@ class Vanishing(Case):
         self.assertEqual((status, answer["used"]), (0, 5))
         self.assertEqual([s["image"] for s in answer["skipped"]], ["parallel"])
         self.assertIn("parallel to the chip", answer["skipped"][0]["reason"])
-        _, out, _ = run("calibrate", "vanishing", "--corners", self.corners(poses, 1), "--square", "--side-mm", 150)
+        page = self.path("page.svg")
+        _, out, _ = run("calibrate", "vanishing", "--corners", self.corners(poses, 1), "--square", "--side-mm", 150,
+                        "--report", page)
         self.assertIn("warning: image parallel skipped", out)
+        texts = page_texts(page)
+        for part in ("5 images of the rectangle were used.", "fx px", "%.2f" % answer["fx"], "a", "parallel", "1.0000"):
+            self.assertIn(part, texts)
 
     def test_no_answer_and_wrong_input(self):
         pairs = SOURCE / "tests/golden/vanishing-points.csv"

@@ -101,6 +101,19 @@ class Recalibrate(Case):
         self.assertEqual(status, 0)
         self.assertIn("9.8600", out)
 
+    def test_the_page(self):
+        page = self.path("page.svg")
+        known = self.arguments("known", *self.pixels(CHANGE, knocked="P3"), self.world())
+        status, answer, err = run_json(*known, "--report", page)
+        self.assertEqual((status, answer["removed"]), (0, ["P3"]), err)
+        texts = page_texts(page)
+        for part in ("Moved camera", "5 of 6 points fit within %.3f px RMS." % answer["rms_px"], "%.3f" % answer["X_WC"][0],
+                     "%.3f" % CAMERA["X_WC"][0], "point P3 was left out: it moved itself, by 8.00 px"):
+            self.assertIn(part, texts)
+        turned = self.arguments("arbitrary", *self.pixels(TURN))
+        self.assertEqual(run(*turned, "--report", page)[0], 0)
+        self.assertIn("The translation is neglected", " ".join(page_texts(page)))
+
     def test_the_camera_is_written_for_activation(self):
         arguments = [*self.arguments("known", *self.pixels(CHANGE), self.world()), "--output", self.path("new.json")]
         _, answer, _ = run_json(*arguments)
