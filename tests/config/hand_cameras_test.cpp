@@ -91,5 +91,53 @@ TEST_F(HandCameras, NeedARobotThatCanTellWhereItsHandIs) {
                                     "a linear axis, on a link of type modbus-tcp or modbus-rtu")));
 }
 
+// Both cameras of a stereo sensor look from every position; a mark that names the position is seen by both.
+class StereoOnAHand : public testing::Test {
+ protected:
+  Json json = parsed(read_file(ZEROPOSE_SOURCE_DIR "/config/cells/window-pane.json"));
+  const std::string calibration = read_file(ZEROPOSE_SOURCE_DIR "/config/cells/window-pane.calibration.json");
+};
+
+TEST_F(StereoOnAHand, LooksFromEveryPositionWithBothCameras) {
+  const Cell cell = parse_cell({json.dump(), "", calibration, ""});
+  const Job& job = cell.jobs.front();
+  ASSERT_EQ(job.positions.size(), 6u);
+  EXPECT_EQ(hand_eyes(job).size(), 12u);
+  ASSERT_EQ(job.views.size(), 12u);
+  EXPECT_EQ(job.views[2].mark, 1u);
+  EXPECT_EQ(job.views[3].mark, 1u);
+  std::vector<Pose> X_RH;
+  for (const HandPosition& position : job.positions)
+    X_RH.push_back(moved(position.X_RH, (Vector6() << 1, -2, 3, 0.01, 0, -0.02).finished()));
+  const auto now = cameras_for(cell, job, X_RH);
+  ASSERT_EQ(now.size(), 14u);
+  EXPECT_EQ(now[5].name, "right at top");
+  EXPECT_TRUE((cell.robots[0].X_WR * X_RH[1] * cell.calibration[1].X_WC).isApprox(now[5].X_WC, 1e-12));
+  EXPECT_EQ(device_of(job, job.views[2].camera, 2), 0u);
+  EXPECT_EQ(device_of(job, job.views[3].camera, 2), 1u);
+}
+
+TEST_F(StereoOnAHand, NamesEachCameraOnceAndAllOfOneHand) {
+  Json& position = json["jobs"][0]["positions"][2];
+  position["cameras"] = {"left", "left"};
+  EXPECT_THAT(
+      mistakes_in(json.dump(), calibration),
+      ElementsAre(HasSubstr("positions[2].cameras[1]: found \"left\" twice, expected each camera once")));
+  position["cameras"] = Json::array();
+  EXPECT_THAT(
+      mistakes_in(json.dump(), calibration),
+      testing::Contains(HasSubstr("positions[2].cameras: found no camera, expected the names of cameras "
+                                  "with on_hand_of, all of one robot")));
+  position["cameras"] = {"left", "right"};
+  json["robots"].push_back(json["robots"][0]);
+  json["robots"][1]["name"] = "robot2";
+  json["robots"][1]["link"]["unit"] = 2;
+  json["cameras"][1]["on_hand_of"] = "robot2";
+  EXPECT_THAT(
+      mistakes_in(json.dump(), calibration),
+      testing::Contains(HasSubstr("positions[2].cameras[1]: found \"right\", expected a camera on the "
+                                  "same hand as the first one")));
+}
+
 }  // namespace
 }  // namespace zeropose

@@ -1,6 +1,6 @@
-// What dominates the error of a correction, without pictures: the tables of docs/cells.md for the car body
-// and the camera on a hand. Each row is a part of the budget alone; errors are drawn anew for each
-// calibration, zero and car.
+// What dominates the error of a correction, without pictures: the tables of docs/cells.md for the car body,
+// the camera on a hand and the stereo sensor on a hand. Each row is a part of the budget alone; errors are
+// drawn anew for each calibration, zero and car.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -27,10 +27,11 @@ struct Budget {
   const char* name;
   double mark_px = 0;
   CalibrationErrors calibration = exact;
-  RobotErrors hand = perfect;    // of a robot that carries the cameras
-  RobotErrors guided = perfect;  // of the robot that goes where it is told
-  double cameras_warmer_k = 0;   // than at the zero measurement: their frame, about the world's origin
-  double object_warmer_k = 0;    // about the object's
+  RobotErrors hand = perfect;            // of a robot that carries the cameras
+  double sensor_mm = 0, sensor_deg = 0;  // of the cameras in the hand, all alike
+  RobotErrors guided = perfect;          // of the robot that goes where it is told
+  double cameras_warmer_k = 0;  // than at the zero measurement: their frame, about the world's origin
+  double object_warmer_k = 0;   // about the object's
 };
 
 // A rotation and a shift, each component of this sigma.
@@ -92,6 +93,10 @@ class BudgetCell {
     Cell believed = true_;
     believed.calibration =
         wrong_calibration(true_.calibration, budget.calibration, static_cast<std::uint64_t>(seed));
+    if (budget.sensor_mm > 0 || budget.sensor_deg > 0) {
+      const Pose off = random_pose(random, budget.sensor_mm, budget.sensor_deg);
+      for (CalibratedCamera& camera : believed.calibration) camera.X_WC = off * camera.X_WC;
+    }
     const std::vector<CalibratedCamera> cameras = cameras_for(believed, job());
     const Pose X_WO0_true = job().X_WO_nominal;
     const ZeroResult zero = make_zero(cameras, job(), look(budget, hand, X_WO0_true, false, 10, random));
@@ -212,6 +217,34 @@ TEST(ErrorBudget, OfTheCameraOnAHandIsWhatTheRobotDoesNotRepeat) {
   const double repeats_mm = rows["the hand repeats to 0.05 mm, 0.003 degrees"].point_mm;
   EXPECT_GT(repeats_mm, 2 * rows["the hand is 0.5 mm, 0.02 degrees off at each position"].point_mm);
   EXPECT_GT(repeats_mm, 2 * rows["marks 0.02 px"].point_mm);
+}
+
+// The sensor's cameras as the glass board leaves them; its place in the hand as known points do.
+TEST(ErrorBudget, OfTheWindowPaneIsWhatTheRobotDoesNotRepeat) {
+  constexpr CalibrationErrors glass_board{0.03, 0.003, 0.0002, 0.3};
+  const std::array budgets{
+      Budget{.name = "marks 0.02 px", .mark_px = 0.02},
+      Budget{.name = "marks 0.1 px", .mark_px = 0.1},
+      Budget{.name = "the sensor's cameras, as after the glass board", .calibration = glass_board},
+      Budget{.name = "the sensor in the hand 0.3 mm, 0.05 degrees", .sensor_mm = 0.3, .sensor_deg = 0.05},
+      Budget{.name = "the hand repeats to 0.05 mm, 0.003 degrees", .hand = robot_repeats},
+      Budget{.name = "the hand is 0.5 mm, 0.02 degrees off at each position", .hand = robot_off},
+      Budget{.name = "the guided robot repeats to 0.05 mm, 0.003 degrees", .guided = robot_repeats},
+      Budget{.name = "the opening 5 K warmer than at the zero", .object_warmer_k = 5},
+      Budget{.name = "all of that, marks 0.02 px",
+             .mark_px = 0.02,
+             .calibration = glass_board,
+             .hand = usual_robot,
+             .sensor_mm = 0.3,
+             .sensor_deg = 0.05,
+             .guided = robot_repeats,
+             .object_warmer_k = 5}};
+  auto rows = table(BudgetCell("window-pane", 12, 0.5), budgets);
+  const double repeats_mm = rows["the hand repeats to 0.05 mm, 0.003 degrees"].point_mm;
+  EXPECT_GT(repeats_mm, 2 * rows["the sensor's cameras, as after the glass board"].point_mm);
+  EXPECT_GT(repeats_mm, 2 * rows["marks 0.02 px"].point_mm);
+  // Opening and pane together: half of the application's millimetre, so that it is beyond 2.5 of them.
+  EXPECT_LT(std::sqrt(2) * rows["all of that, marks 0.02 px"].point_mm, 0.4);
 }
 
 }  // namespace
