@@ -20,7 +20,7 @@ double top_of(std::span<const ErrorBar> bars) {
     all = std::max(all, bar.value);
     if (bar.used) used = std::max(used, bar.value);
   }
-  return std::max(1.15 * (used > 0 ? std::min(all, 3 * used) : all), 1e-9);
+  return std::max(1.15 * (used > 0 ? std::min(all, 3 * used) : all), 1e-3);
 }
 
 // Every so many names are written.
