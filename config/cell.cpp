@@ -9,6 +9,7 @@
 #include "config/cameras.h"
 #include "config/cell_checks.h"
 #include "config/files.h"
+#include "config/gap_reader.h"
 #include "config/ipv4.h"
 #include "config/job_reader.h"
 #include "config/json_reader.h"
@@ -180,11 +181,13 @@ void add_calibration(Cell& cell, const std::string& text, const std::string& nam
   cell.calibration_hash = short_hash(text);
 }
 
-// Points that are known by their pixel get a place on its line of sight; all must lie in the pictures.
-void place_references(Cell& cell, const std::string& name, std::vector<std::string>& mistakes) {
+// Points that are known by their pixel get a place on its line of sight; all must lie in the pictures. Planes
+// of gaps must be seen.
+void check_with_calibration(Cell& cell, const std::string& name, std::vector<std::string>& mistakes) {
   if (!mistakes.empty()) return;
   JsonReading reading(name);
   put_references_in_place(cell, reading);
+  check_gap_planes(cell, reading);
   append(mistakes, reading.mistakes());
 }
 
@@ -195,7 +198,7 @@ Cell parse_cell(const CellText& text) {
   std::string calibration;
   Cell cell = read_cell_file(text.cell, text.cell_name, calibration, mistakes);
   add_calibration(cell, text.calibration, text.calibration_name, mistakes);
-  place_references(cell, text.cell_name, mistakes);
+  check_with_calibration(cell, text.cell_name, mistakes);
   if (!mistakes.empty()) throw ConfigError(std::move(mistakes));
   return cell;
 }
@@ -209,7 +212,7 @@ Cell load_cell(const std::filesystem::path& path) {
       const std::filesystem::path file = path.parent_path() / calibration;
       cell.calibration_file = file;
       add_calibration(cell, read_file(file), file.string(), mistakes);
-      place_references(cell, path.string(), mistakes);
+      check_with_calibration(cell, path.string(), mistakes);
     } catch (const ConfigError& error) {
       append(mistakes, error.mistakes());
     }

@@ -1,4 +1,5 @@
 #include "config/cell_checks.h"
+#include "config/gap_reader.h"
 #include "config/text.h"
 #include "protocol/link_checks.h"
 
@@ -106,6 +107,10 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
       [](const Job& job) { return job.number == 0 ? std::string() : std::to_string(job.number); }, reading);
   for (std::size_t i = 0; i < cell.jobs.size(); ++i) {
     const std::string path = path_of("jobs", i);
+    if (cell.jobs[i].gaps) {
+      check_gaps(cell, cell.jobs[i], path + ".gaps", reading);
+      continue;
+    }
     check_unique(cell.jobs[i].marks, path + ".marks", "name", name_in_quotes, reading);
     check_unique(cell.jobs[i].positions, path + ".positions", "name", name_in_quotes, reading);
     check_positions(cell, cell.jobs[i], path, reading);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string_view>
 
+#include "config/gap_reader.h"
 #include "config/text.h"
 
 namespace zeropose {
@@ -123,6 +124,16 @@ HandPosition read_position(JsonObject& object, const std::vector<Mounted>& camer
   return position;
 }
 
+// A job looks at marks or evens gaps.
+void refuse_keys_of_marks(JsonObject& object) {
+  for (const char* key : {"nominal_pose", "planar", "positions", "positions_within_s", "search_mm",
+                          "system_sigma_px", "marks", "application_points", "requirements", "limits"}) {
+    object.skip(key);
+    if (object.has(key))
+      object.add_mistake(key, "a key of jobs with marks beside gaps", "one of both kinds of job");
+  }
+}
+
 // Returns what the job's marks can be seen from.
 Eyes read_positions(JsonObject& object, const std::vector<Mounted>& cameras, Job& job) {
   object.read_each_optional(
@@ -189,13 +200,19 @@ Job read_job(JsonObject& object, const std::vector<Mounted>& cameras) {
   Job job;
   object.read("name", job.name);
   object.read("number", job.number, 1, 65535);
+  if (object.read_optional("gaps", [&](JsonObject& member) { job.gaps = read_gaps(member, cameras); })) {
+    refuse_keys_of_marks(object);
+    return job;
+  }
+  job.gaps.reset();
   object.read("nominal_pose", job.X_WO_nominal);
   Pose X_WP = Pose::Identity();
   if (object.read_optional("planar", X_WP)) job.X_WP_planar = X_WP;
   const Eyes eyes = read_positions(object, cameras, job);
   object.read("search_mm", job.search_mm, NumberRange{0, 10000, true});
   object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
-  object.read_each("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
+  if (!object.has("marks")) object.add_mistake("marks", "no such key", "the job's marks, or gaps");
+  object.read_each_optional("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
     const NamedMark named = read_mark(member);
     add_views(member, named, eyes, job.marks.size(), job.views);
     job.marks.push_back(named.mark);

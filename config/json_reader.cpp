@@ -300,8 +300,13 @@ bool JsonObject::read_each(std::string_view key, std::size_t least,
 
 bool JsonObject::read_each_optional(std::string_view key,
                                     const std::function<void(JsonObject&)>& read_members) {
+  return read_each_optional(key, 0, read_members);
+}
+
+bool JsonObject::read_each_optional(std::string_view key, std::size_t least,
+                                    const std::function<void(JsonObject&)>& read_members) {
   note(key);
-  return has(key) && read_each(key, 0, read_members);
+  return has(key) && read_each(key, least, read_members);
 }
 
 bool JsonObject::read_word(std::string_view key, std::span<const std::string_view> words,

@@ -92,6 +92,8 @@ class JsonObject {
     return has(key) && read(key, std::forward<Arguments>(arguments)...);
   }
   bool read_each_optional(std::string_view key, const std::function<void(JsonObject&)>& read_members);
+  bool read_each_optional(std::string_view key, std::size_t least,
+                          const std::function<void(JsonObject&)>& read_members);
 
   // One of the given words; `index` becomes its index.
   bool read_word(std::string_view key, std::span<const std::string_view> words, std::size_t& index);

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cycle.h"
+#include "daemon/gap_json.h"
 #include "daemon/overlay.h"
 #include "daemon/pose_json.h"
 #include "daemon/proposal_json.h"
@@ -99,6 +100,11 @@ Json status_answer(Cycle& cycle) {
               {"zero_state", verdict(status.zero_code, status.zero_reason)}};
   answer["proposal"] = proposal_json(status.proposal, cycle.cell());
   if (status.zero) answer["zero"] = zero_json(*status.zero);
+  if (status.last_gaps) {
+    const auto job = std::ranges::find(cycle.cell().jobs, status.job, &Job::name);
+    answer["gaps"] = gaps_json(*job, cycle.cell(), *status.last_gaps);
+    answer["gaps"]["verdict"] = verdict(status.last_gaps->code, status.last_gaps->reason);
+  }
   return answer;
 }
 
@@ -158,6 +164,7 @@ Json measure_answer(Cycle& cycle) {
   if (!outcome.frames.empty()) answer["trigger_spread_us"] = microseconds(outcome.trigger_spread);
   if (outcome.device_spread) answer["device_spread_us"] = microseconds(*outcome.device_spread);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
+  if (m.gaps) answer["gaps"] = gaps_json(*outcome.job, cycle.cell(), m);
   answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
   answer["proposal"] = proposal_json(outcome.proposal, cycle.cell());
   answer["cameras"] = Json::array();
@@ -166,7 +173,7 @@ Json measure_answer(Cycle& cycle) {
         {{"name", outcome.frames[i].camera}, {"health", health_json(outcome.health[i])}});
   if (m.code != Code::ok) return answer;
   answer["X_O0O"] = six_json(m.X_O0O);
-  answer["X_WO"] = six_json(m.pose.X_WO);
+  if (!m.gaps) answer["X_WO"] = six_json(m.pose.X_WO);
   answer["effective_marks"] = m.pose.effective_marks;
   answer["effective_cameras"] = m.pose.effective_cameras;
   answer["largest_deviation_mm"] = m.largest_deviation_mm;
@@ -204,8 +211,10 @@ Json snapshot_answer(Cycle& cycle, const std::string& name, bool marks) {
   const Snapshot snapshot = cycle.snapshot_now(static_cast<std::size_t>(camera - cameras.begin()));
   Json answer = verdict(code_of(snapshot.grabbed.status), snapshot.grabbed.reason);
   if (snapshot.grabbed.status != GrabStatus::ok) return answer;
-  answer["png"] = base64(
-      overlay_png(view_of(snapshot.grabbed.frame), marks ? snapshot.marks : std::vector<MarkOverlay>{}));
+  const ImageView image = view_of(snapshot.grabbed.frame);
+  answer["png"] = base64(marks && !snapshot.gaps.empty()
+                             ? overlay_png(image, snapshot.gaps)
+                             : overlay_png(image, marks ? snapshot.marks : std::vector<MarkOverlay>{}));
   return answer;
 }
 

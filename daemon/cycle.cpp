@@ -118,7 +118,7 @@ void Cycle::refresh() {
   cell.cameras_alive = std::ranges::all_of(eyes_of(cell_, job), [&](std::size_t eye) {
     return now.cameras[device_of(job, eye, cell_.cameras.size())].state == CameraState::alive;
   });
-  cell.zero_valid = now.zero.has_value();
+  cell.zero_valid = now.zero.has_value() || job.gaps;
   cell.camera_moved = a_camera_moved();
   cell.simulated = cell_.simulated;
   cell.config_hash = cell_.config_hash;
@@ -126,6 +126,7 @@ void Cycle::refresh() {
   cell.zero_id = now.zero ? now.zero->id : 0;
   now.ready = cell.cameras_alive && cell.zero_valid;
   if (cell.camera_moved) now.proposal = proposal_;
+  now.last_gaps = last_gaps_;
   for (RobotLink* link : links_) link->set_cell_state(cell);
 
   const std::lock_guard lock(mutex_);
@@ -217,6 +218,11 @@ Report Cycle::report_for(const Request& request) {
       }
       RobotLink& link = *links_.at(request.robot);
       const RobotOptions& robot = cell_.robots.at(request.robot);
+      if (const std::string why = not_for(cell_.jobs[selected_], request.robot); !why.empty()) {
+        report.code = Code::wrong_position;
+        spdlog::warn("{} request {}: {}", robot.name, request.id, why);
+        return report;
+      }
       const auto outcome = measure(request.part, request.deadline, [&] { link.exposure_done(request.id); });
       hands_.forget();  // every picture counts once, whatever came of it
       const Measurement& m = outcome.measurement;
@@ -225,7 +231,9 @@ Report Cycle::report_for(const Request& request) {
       report.effective_cameras = m.pose.effective_cameras;
       report.largest_deviation_mm = m.largest_deviation_mm;
       report.sigma_mm = m.sigma_mm;
-      if (m.code == Code::ok)
+      if (m.code == Code::ok && m.gaps)
+        report.correction = m.X_O0O;
+      else if (m.code == Code::ok)
         report.correction = correction(robot.frame, base_of(robot, request),
                                        zeros_[selected_].record->zero.X_WO0, m.pose.X_WO);
       if (m.code == Code::ok && Clock::now() < request.deadline) X_O0O_last_ = m.X_O0O;
@@ -267,6 +275,7 @@ void Cycle::select(std::size_t job) {
   if (job == selected_) return;
   selected_ = job;
   X_O0O_last_.reset();
+  last_gaps_.reset();
   hands_.forget();
   forget_checks();
 }
@@ -278,7 +287,7 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
   outcome.job = &job;
   Measurement& m = outcome.measurement;
   const auto& zero = zeros_[selected_].record;
-  if (!zero) {
+  if (!zero && !job.gaps) {
     m.code = zeros_[selected_].code;
     m.reason = zeros_[selected_].reason;
     return outcome;
@@ -302,7 +311,9 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
   const References* references = cell_.references.views.empty() ? nullptr : &cell_.references;
   const auto images = images_of(grabbed.eyes, outcome.frames);
   const auto cameras = cameras_for(cell_, job, hands_.hands(job));
-  m = zeropose::measure({images, job, cameras, zero->zero, X_O0O_last_, references, &trend_});
+  static const Zero none;  // gaps need none
+  m = zeropose::measure({images, job, cameras, zero ? zero->zero : none, X_O0O_last_, references, &trend_});
+  if (m.gaps) last_gaps_ = m;
   remember(m.references);
   proposal_ = {};
   if (m.code == Code::camera_moved) moved_ = {&job, grabbed.eyes, outcome.frames, cameras, m};
@@ -337,8 +348,9 @@ Snapshot Cycle::snapshot_now(std::size_t camera) {
 Snapshot Cycle::snapshot(std::size_t camera) {
   const Job& job = cell_.jobs[selected_];
   const std::size_t cameras[] = {camera};
-  Snapshot snapshot{std::move(grabber_.grab(cameras, Clock::now() + cell_.deadline).front()), {}};
+  Snapshot snapshot{std::move(grabber_.grab(cameras, Clock::now() + cell_.deadline).front()), {}, {}};
   if (snapshot.grabbed.status != GrabStatus::ok) return snapshot;
+  find_gaps(camera, snapshot);
   const auto& zero = zeros_[selected_].record;
   const Pose X_WO_expected = zero ? zero->zero.X_WO0 : job.X_WO_nominal;
   const auto calibration = cameras_for(cell_, job);

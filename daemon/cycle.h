@@ -49,6 +49,7 @@ struct ZeroOutcome {
 struct Snapshot {
   GrabResult grabbed;
   std::vector<MarkOverlay> marks;
+  std::vector<GapOverlay> gaps;
 };
 
 struct SurveyState {
@@ -74,9 +75,10 @@ struct Status {
   std::string zero_reason;  // why there is none, one sentence
   std::optional<ZeroRecord> zero;
   std::vector<CameraStatus> cameras;
-  bool cameras_known = false;  // every camera was tried at least once
-  Proposal proposal;           // of the last measurement that found a camera moved
-  std::uint64_t cycles = 0;    // requests of robots carried out
+  bool cameras_known = false;            // every camera was tried at least once
+  Proposal proposal;                     // of the last measurement that found a camera moved
+  std::uint64_t cycles = 0;              // requests of robots carried out
+  std::optional<Measurement> last_gaps;  // the last measurement of the job, where it evens gaps
 };
 
 // Of the deadline, kept for measuring and publishing.
@@ -156,6 +158,9 @@ class Cycle {
   ZeroOutcome take_zero(std::optional<std::uint32_t> part, TimePoint deadline);
   void keep(const Job& job, const ZeroResult& result, std::size_t frames, ZeroOutcome& outcome);
   Snapshot snapshot(std::size_t camera);
+  void find_gaps(std::size_t camera, Snapshot& snapshot) const;
+  // Measures gaps are for the robot alone that carries cameras and pane: why another one gets none.
+  std::string not_for(const Job& job, std::size_t robot) const;
   void remember(const ReferenceCheck& check);
   bool a_camera_moved() const;
   // Where the cameras are that the last measurement found moved; takes its time, so the robot is answered
@@ -175,12 +180,13 @@ class Cycle {
   // The last result that a robot was sent as valid: what the step limit compares with. None after the start,
   // a new zero, a change of job and a Reset.
   std::optional<Pose> X_O0O_last_;
-  ReferenceTrend trend_;              // since the zero of the selected job
-  std::vector<CameraCheck> checks_;   // by camera, when its references were last looked at
-  std::vector<CameraHealth> health_;  // by camera
-  std::optional<Moved> moved_;        // until something is proposed
-  Proposal proposal_;                 // since the zero of the selected job
-  HandPictures hands_;                // of the selected job
+  ReferenceTrend trend_;                  // since the zero of the selected job
+  std::vector<CameraCheck> checks_;       // by camera, when its references were last looked at
+  std::vector<CameraHealth> health_;      // by camera
+  std::optional<Moved> moved_;            // until something is proposed
+  Proposal proposal_;                     // since the zero of the selected job
+  HandPictures hands_;                    // of the selected job
+  std::optional<Measurement> last_gaps_;  // of the selected job
   SurveyState survey_;
 
   mutable std::mutex mutex_;

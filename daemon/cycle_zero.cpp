@@ -10,12 +10,20 @@ using Clock = std::chrono::steady_clock;
 
 std::string hex(std::uint32_t number) { return fmt::format("{:08x}", number); }
 
+std::string needs_none(const Job& job) {
+  return "job " + job.name + " evens gaps and needs no zero measurement";
+}
+
 }  // namespace
 
 // A zero that cannot be used is no reason not to run: the cell is not ready and says so.
 void Cycle::load_zeros() {
   std::filesystem::create_directories(state_);
   for (const Job& job : cell_.jobs) {
+    if (job.gaps) {
+      zeros_.push_back({Code::no_procedure, needs_none(job), {}});
+      continue;
+    }
     const StoredZero& zero = zeros_.emplace_back(load_zero_for(state_, cell_, job));
     if (zero.record)
       spdlog::info("job {}: zero {} of {}", job.name, hex(zero.record->id), zero.record->time_utc);
@@ -26,6 +34,7 @@ void Cycle::load_zeros() {
 
 ZeroOutcome Cycle::take_zero(std::optional<std::uint32_t> part, TimePoint deadline) {
   const Job& job = cell_.jobs[selected_];
+  if (job.gaps) return {Code::no_procedure, needs_none(job), {}, Vector6::Zero()};
   if (std::string missing = hands_.missing(job, part, Clock::now()); !missing.empty())
     return {Code::position_missing, std::move(missing), {}, Vector6::Zero()};
   const auto cameras = cameras_for(cell_, job, hands_.hands(job));

@@ -3,7 +3,11 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <iomanip>
+#include <sstream>
 
 namespace zeropose {
 namespace {
@@ -51,6 +55,57 @@ void draw(cv::Mat& picture, const MarkOverlay& mark) {
   write_text(picture, text, corner + Eigen::Vector2d(4, 14), found ? green : red);
 }
 
+// The window as it is turned.
+void draw_window(cv::Mat& picture, const GapSearch& search, const cv::Scalar& colour) {
+  const Eigen::Vector2d across(std::cos(search.direction_rad), std::sin(search.direction_rad));
+  const Eigen::Vector2d a = search.half_across_px * across;
+  const Eigen::Vector2d l = search.half_along_px * Eigen::Vector2d(-across.y(), across.x());
+  const Eigen::Vector2d& c = search.centre_px;
+  const std::array<Eigen::Vector2d, 4> corners{c - a - l, c + a - l, c + a + l, c - a + l};
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    cv::line(picture, fixed(corners[i]), fixed(corners[(i + 1) % corners.size()]), colour, 1, cv::LINE_AA,
+             sub_bits);
+}
+
+void draw_edge(cv::Mat& picture, const MarkFinding& edge, const cv::Scalar& colour) {
+  if (edge.diameter_px <= 0) return;
+  const Eigen::Vector2d along(-std::sin(edge.direction_rad), std::cos(edge.direction_rad));
+  cv::line(picture, fixed(edge.u_px - edge.diameter_px / 2 * along),
+           fixed(edge.u_px + edge.diameter_px / 2 * along), colour, 1, cv::LINE_AA, sub_bits);
+}
+
+// A sentence in as many lines as the picture's width needs.
+void write_lines(cv::Mat& picture, const std::string& text, Eigen::Vector2d at_px, const cv::Scalar& colour) {
+  constexpr double line_px = 16, letter_px = 8.5;
+  const auto most = static_cast<std::size_t>(std::max(10.0, (picture.cols - at_px.x()) / letter_px));
+  for (std::size_t from = 0; from < text.size();) {
+    std::size_t length = std::min(most, text.size() - from);
+    const std::size_t space = text.rfind(' ', from + length);
+    if (from + length < text.size() && space != std::string::npos && space > from) length = space - from;
+    write_text(picture, text.substr(from, length), at_px, colour);
+    from += length + 1;
+    at_px.y() += line_px;
+  }
+}
+
+void draw(cv::Mat& picture, const GapOverlay& gap) {
+  const bool found = gap.found.status == GapStatus::ok;
+  draw_window(picture, gap.search, found ? blue : red);
+  for (const GapEdge* edge : {&gap.found.frame, &gap.found.pane})
+    draw_edge(picture, edge->finding, edge->finding.status == MarkStatus::found ? green : red);
+  if (found)
+    cv::line(picture, fixed(gap.found.frame.finding.u_px), fixed(gap.found.pane.finding.u_px), green, 1,
+             cv::LINE_AA, sub_bits);
+  std::ostringstream text;
+  text << gap.name << ": ";
+  if (found)
+    text << std::fixed << std::setprecision(3) << gap.found.gap_mm << " mm";
+  else
+    text << name_of(gap.found.status);
+  write_text(picture, text.str(), {8, 20}, found ? green : red);
+  if (!found) write_lines(picture, gap.found.reason, {8, 38}, red);
+}
+
 cv::Mat colour_copy(const ImageView& image) {
   // OpenCV has no read-only view; the pixels are only read.
   cv::Mat grey(image.height_px, image.width_px, image.two_bytes() ? CV_16UC1 : CV_8UC1,
@@ -89,6 +144,12 @@ void draw(cv::Mat& picture, const BoardPoint& point, const std::string& text) {
 std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const MarkOverlay> marks) {
   cv::Mat picture = colour_copy(image);
   for (const auto& mark : marks) draw(picture, mark);
+  return png_of(picture);
+}
+
+std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const GapOverlay> gaps) {
+  cv::Mat picture = colour_copy(image);
+  for (const auto& gap : gaps) draw(picture, gap);
   return png_of(picture);
 }
 

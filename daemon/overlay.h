@@ -8,6 +8,7 @@
 
 #include "measure/board.h"
 #include "measure/body.h"
+#include "measure/gap.h"
 #include "measure/image.h"
 #include "measure/marks.h"
 
@@ -22,6 +23,16 @@ struct MarkOverlay {
 // PNG bytes: search areas in blue, found outlines and centres in green, what was not found in red with its
 // reason.
 std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const MarkOverlay> marks);
+
+struct GapOverlay {
+  std::string name;
+  GapSearch search;
+  GapResult found;
+};
+
+// PNG bytes: the windows in blue, the edges of frame and pane in green as long as they are seen, with the gap
+// in mm between them; what was not measured in red with its reason.
+std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const GapOverlay> gaps);
 
 // PNG bytes: the points of a board in green, each with row.column, joined in their order by blue lines (red
 // from one row to the next), and the reason, if there is one.

@@ -66,7 +66,8 @@ struct JobPictures {
   std::optional<std::chrono::nanoseconds> device_spread;
 };
 
-// The fixed cameras of the job, then those of its positions, as View::camera counts them.
+// The fixed cameras of the job, or those that look at its gaps, then those of its positions, as View::camera
+// counts them.
 std::vector<std::size_t> eyes_of(const Cell& cell, const Job& job);
 
 // Grabs the fixed cameras and adds the pictures of the hands, `back` rounds ago.

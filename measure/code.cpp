@@ -29,9 +29,12 @@ constexpr std::array table{
         "A command carried an argument outside its range.",
         "Check the argument in the robot program, above all its unit and its sign; before AtPosition, write "
         "the position block with the same index."},
-    CodeText{Code::no_procedure, "no_procedure",
-             "A robot told its position, but no calibration waits for it.",
-             "Start the calibration first, then the robot program that goes through the positions."},
+    CodeText{
+        Code::no_procedure, "no_procedure",
+        "A robot told its position, but no calibration waits for it; or it asked for a zero measurement that "
+        "its job does not need.",
+        "Start the calibration first, then the robot program that goes through the positions. A job that "
+        "evens gaps has no zero."},
     CodeText{Code::wrong_position, "wrong_position",
              "The robot's hand is not where the job's position was taught, or it is another robot's.",
              "Compare the position in the robot program with the cell file: index, pose, and the frame it is "
@@ -139,6 +142,11 @@ constexpr std::array table{
         "Check how the object stands and whether it is the right one. If the jump is wanted, let the robot "
         "send Reset, select another job or take a new zero: the next result is then not compared. "
         "Acknowledge alone does not do it."},
+    CodeText{
+        Code::gaps_not_even, "gaps_not_even",
+        "The pane stands as evenly as it can, and its gaps are still not within the tolerance.",
+        "Look at the gaps in the pictures: does this pane fit this frame, does it sit right in the gripper? "
+        "Change the tolerance only if such a gap may leave the plant."},
 
     CodeText{
         Code::camera_moved, "camera_moved", "A camera is not where it was at the zero measurement.",

@@ -54,6 +54,7 @@ enum class Code : std::uint16_t {
   value_out_of_range = 507,
   limit_displacement = 508,
   step_too_large = 509,
+  gaps_not_even = 510,
 
   camera_moved = 601,
   reference_missing = 602,

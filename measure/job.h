@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calib/camera_model.h"
+#include "measure/gap_task.h"
 #include "measure/marks.h"
 
 namespace zeropose {
@@ -85,6 +86,7 @@ struct Job {
   double system_sigma_px = 0;      // calibration errors that remain after zero (M6.3)
   std::vector<ApplicationPoint> application_points;
   Requirements requirements;
+  std::optional<GapTask> gaps{};  // such a job has no marks and no positions, and needs no zero measurement
 };
 
 // A camera at one of the job's positions.

@@ -7,6 +7,8 @@
 
 #include "calib/words.h"
 #include "measure/association.h"
+#include "measure/gap_job.h"
+#include "measure/picture_checks.h"
 #include "measure/security.h"
 #include "measure/sharpness.h"
 
@@ -72,23 +74,6 @@ MarkSearch search_for(const CalibratedCamera& camera, const Mark& mark, double s
   return search;
 }
 
-// Its place among the images; their number: there is none.
-std::size_t place_of(std::span<const CameraImage> images, std::size_t camera) {
-  return static_cast<std::size_t>(std::ranges::find(images, camera, &CameraImage::camera) - images.begin());
-}
-
-const ImageView* image_of(std::span<const CameraImage> images, std::size_t camera) {
-  const std::size_t place = place_of(images, camera);
-  return place < images.size() ? &images[place].image : nullptr;
-}
-
-std::vector<PictureHealth> health_of(std::span<const CameraImage> images) {
-  std::vector<PictureHealth> health;
-  for (const CameraImage& image : images)
-    health.push_back(image.image.data != nullptr ? picture_health(image.image) : PictureHealth{});
-  return health;
-}
-
 // O0 in the plane of a sheet as x, y and rz alone; what is left of the others is rounding.
 Pose flattened(const Pose& X_PO) {
   const SixNumbers six = to_six_numbers(X_PO);
@@ -128,16 +113,7 @@ Verdict check_images(std::span<const CameraImage> images, std::span<const Pictur
       return {Code::marks_invalid, "job " + job.name + " names a camera or a mark that does not exist"};
     if (checked[view.camera]) continue;
     checked[view.camera] = true;
-    const CalibratedCamera& camera = cameras[view.camera];
-    const ImageView* image = image_of(images, view.camera);
-    if (image == nullptr || image->data == nullptr)
-      return {Code::camera_missing, "there is no picture of " + camera.name};
-    if (image->width_px != camera.model.width_px || image->height_px != camera.model.height_px)
-      return {Code::frame_wrong_size, camera.name + " delivered " + number(image->width_px) + " x " +
-                                          number(image->height_px) + " px, it is calibrated for " +
-                                          number(camera.model.width_px) + " x " +
-                                          number(camera.model.height_px)};
-    Verdict verdict = check_image(health[place_of(images, view.camera)], camera.name);
+    Verdict verdict = check_picture(images, health, view.camera, cameras[view.camera]);
     if (verdict.code != Code::ok) return verdict;
   }
   return {Code::ok, {}};
@@ -352,6 +328,7 @@ std::optional<double> mark_blur_px(std::span<const MarkFinding> findings, const 
 
 Measurement measure(const MeasurementProblem& problem) {
   const auto& [images, job, cameras, zero, X_O0O_last, references, trend] = problem;
+  if (job.gaps) return measure_gaps(problem);
   Measurement measurement;
   measurement.health = health_of(images);
   if (!passes(measurement, check_zero(job, zero))) return measurement;

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "measure/gap_job.h"
 #include "measure/image.h"
 #include "measure/job.h"
 #include "measure/picture_health.h"
@@ -34,6 +35,8 @@ struct Measurement {
   double hidden_mm = 0;             // what one wrong mark could do at the worst application point unnoticed
   std::vector<MarkFinding> reference_findings;  // one per view of the references
   ReferenceCheck references;
+  std::optional<GapMeasurement>
+      gaps;  // of a job that evens gaps (measure/gap_job.h); it has none of the marks
 };
 
 // Where find_job_marks() looks: one search per view of the job (the snapshot draws them). The window reaches
@@ -68,6 +71,8 @@ struct MeasurementProblem {
 // the cause of all that follows, so it is asked about before the marks; one that sees too few references
 // after them. The first check that fails names the code. Marks are searched around the zero pose and used
 // where the zero measurement's compensation puts them.
+//
+// A job that evens gaps goes the way of measure_gaps().
 //
 // image_blurred and image_saturated also where the job's requirements on marks fail only because the finder
 // calls marks blurred or saturated: with those they would be met.

@@ -73,6 +73,8 @@ void paint(Canvas& canvas, const CarriedBody& body, const Pose& X_CW) {
   for (const Side& side : sides) paint_side(canvas, side, X_CB);
 }
 
+void paint(Canvas&, const CarriedPane&, const Pose&) {}
+
 }  // namespace
 
 std::vector<PrintedMark> printed_board(int rows, int cols, double pitch_mm, double diameter_mm) {

@@ -27,7 +27,12 @@ struct CarriedBody {
   std::vector<PrintedMark> marks;
 };
 
-using Carried = std::variant<CarriedBall, CarriedBody>;
+// The pane before a window opening (sim/gap_object.h); the object's look paints it.
+struct CarriedPane {
+  Pose X_WT = Pose::Identity();
+};
+
+using Carried = std::variant<CarriedBall, CarriedBody, CarriedPane>;
 
 // Asymmetric circles as in OpenCV: ((2 col + row % 2), row) times the pitch, seen from negative z.
 std::vector<PrintedMark> printed_board(int rows, int cols, double pitch_mm, double diameter_mm);

@@ -12,6 +12,7 @@
 #include "protocol/line_socket.h"
 #include "sim/cell_control.h"
 #include "sim/drive.h"
+#include "sim/gap_drive.h"
 #include "sim/sim_file.h"
 
 namespace zeropose {
@@ -69,6 +70,25 @@ DriveOptions drive_options(const Options& options) {
   return drive;
 }
 
+// Of a cell that evens gaps.
+int run_gap_drive(const Options& options, const Cell& cell, SimulatedCell& simulated,
+                  const std::atomic<bool>& stop) {
+  const std::filesystem::path truth = sim_file_of(options.cell);
+  std::optional<GapDriveOptions> drive = load_sim_file(truth).gap_drive;
+  if (!drive)
+    throw std::invalid_argument(truth.string() + " does not say what to drive: it has no key gap_drive");
+  drive->parts = options.cars;
+  drive->seed = options.seed.value_or(drive->seed);
+  const auto show = [&simulated](const Pose& X_WO, const std::set<std::string>& covered) {
+    simulated.cover(covered);
+    simulated.show(X_WO);
+  };
+  const auto move_hand = [&simulated](std::size_t robot, const Pose& X_RH) {
+    simulated.move_hand(robot, X_RH);
+  };
+  return drive_gaps(cell, std::get<GapsObject>(simulated.scene().object), {show, move_hand}, *drive, stop);
+}
+
 SurveyDrive survey_of(const Options& options) {
   const std::filesystem::path truth = sim_file_of(options.cell);
   for (SurveyDrive& survey : load_sim_file(truth).surveys)
@@ -97,6 +117,8 @@ int run(const Options& options) {
         {[&simulated](const Carried& target) { simulated.show_target(target); },
          [&](std::size_t job) { simulated.show(job, cell.jobs[job].X_WO_nominal); }, move_hand},
         signals.stopped());
+  if (options.drives && cell.jobs.front().gaps)
+    return run_gap_drive(options, cell, simulated, signals.stopped());
   if (options.drives) {
     std::vector<Pose> X_WO0;
     for (const Job& job : cell.jobs) X_WO0.push_back(job.X_WO_nominal);
@@ -115,6 +137,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--shift", options.shift, "where the object stands from its nominal pose: x,y,z,rx,ry,rz");
   app.add_option("--fault", options.faults,
                  "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK,\n"
+                 "cover-mark:'GAP dirt' (glint, hidden, taped), "
                  "camera-moved:CAMERA");
   app.add_option("--survey", options.survey,
                  "run the robot's program of this survey of the truth file: a camera's name, or its own");

@@ -1,6 +1,7 @@
 #include "sim/look.h"
 
 #include "sim/ball_plate_look.h"
+#include "sim/gap_look.h"
 #include "sim/plates_look.h"
 #include "sim/steel_sheet_look.h"
 
@@ -17,6 +18,10 @@ std::unique_ptr<const Look> look_of(const SheetObject& sheet, const Scene& scene
 
 std::unique_ptr<const Look> look_of(const BallPlateObject& plate, const Scene& scene, std::size_t camera) {
   return std::make_unique<BallPlateLook>(plate, scene, camera);
+}
+
+std::unique_ptr<const Look> look_of(const GapsObject& gaps, const Scene& scene, std::size_t camera) {
+  return std::make_unique<GapLook>(gaps, scene, camera);
 }
 
 }  // namespace

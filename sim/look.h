@@ -16,6 +16,7 @@ struct Moment {
   Pose X_CW = Pose::Identity(), X_CO = Pose::Identity();
   Pose X_CnCo = Pose::Identity();  // the camera's place in the scene, as seen from where it is now
   const Faults& faults;
+  std::optional<Pose> X_CT{};  // of the pane that the hand carries
 
   bool covered(const std::string& mark) const { return faults.covered.contains(mark); }
   // A mark at X_CM, or displaced at the same distance if it has that fault.

@@ -15,7 +15,9 @@ std::vector<float> CameraRenderer::clean_picture(const Pose& X_WO, const Faults&
   const auto moved = faults.moved_cameras.find(name_);
   const Pose X_CnCo = moved == faults.moved_cameras.end() ? Pose::Identity() : moved->second.inverse();
   const Pose X_CW = X_CnCo * X_CW_;
-  const Moment moment{X_CW, X_CW * X_WO, X_CnCo, faults};
+  const auto* pane = carried ? std::get_if<CarriedPane>(&*carried) : nullptr;
+  const auto X_CT = pane != nullptr ? std::optional<Pose>(X_CW * pane->X_WT) : std::nullopt;
+  const Moment moment{X_CW, X_CW * X_WO, X_CnCo, faults, X_CT};
   Canvas canvas(rays_, blur_sigma_px_, 0);
   look_->paint(canvas, moment);
   for (const MarkPlate& plate : references_) paint_plate(canvas, plate, X_CW, moment);

@@ -52,7 +52,10 @@ void put_on_hands(const Cell& cell, const Job& job, Scene& scene) {
     const auto position = std::ranges::find_if(job.positions, [&](const HandPosition& p) {
       return std::ranges::find(p.cameras, i) != p.cameras.end();
     });
-    const Pose X_RH = position == job.positions.end() ? Pose::Identity() : position->X_RH;
+    const auto* gaps = std::get_if<GapsObject>(&scene.object);
+    const Pose X_RH = position != job.positions.end() ? position->X_RH
+                      : gaps != nullptr               ? gaps->X_RH
+                                                      : Pose::Identity();
     scene.cameras[i] = virtual_camera(scene.cameras[i], cell.robots[robot].X_WR * X_RH);
   }
 }
@@ -62,13 +65,15 @@ Scene scene_of(const Cell& cell, const Job& job, const std::vector<CalibratedCam
   Scene scene;
   scene.cameras = cameras;
   scene.marks = job.marks;
+  scene.object = truth.object;
+  if (auto* gaps = std::get_if<GapsObject>(&scene.object)) complete(*gaps, cell, scene.cameras);
   put_on_hands(cell, job, scene);
   for (const View& view : job.views)
     add_view(scene.views, {device_of(job, view.camera, cell.cameras.size()), view.mark});
   for (const ReferencePoint& point : cell.references.points) scene.fixed_marks.push_back(point.mark);
   scene.fixed_views = cell.references.views;
-  scene.X_WO_nominal = job.X_WO_nominal;
-  scene.object = truth.object;
+  const auto* gaps = std::get_if<GapsObject>(&scene.object);
+  scene.X_WO_nominal = gaps != nullptr ? gaps->X_WR * gaps->X_RH * gaps->X_HT : job.X_WO_nominal;
   scene.picture = truth.picture;
   return scene;
 }
@@ -88,6 +93,10 @@ std::vector<Scene> load_scenes(const Cell& cell, const std::filesystem::path& si
   std::vector<std::string> mistakes;
   const auto cameras = in_order(cell.cameras, truth.cameras, sim_file.string(), mistakes);
   if (cell.jobs.empty()) mistakes.push_back("the cell has no job, expected one whose marks can be rendered");
+  for (const Job& job : cell.jobs)
+    if (job.gaps && !std::holds_alternative<GapsObject>(truth.object))
+      mistakes.push_back(sim_file.string() + ": object: job " + job.name +
+                         " has gaps, expected an object of kind gaps");
   if (!mistakes.empty()) throw ConfigError(mistakes);
   std::vector<Scene> scenes;
   for (const Job& job : cell.jobs) scenes.push_back(scene_of(cell, job, cameras, truth));

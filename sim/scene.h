@@ -13,6 +13,7 @@
 #include "calib/camera_model.h"
 #include "config/cell.h"
 #include "measure/job.h"
+#include "sim/gap_object.h"
 
 namespace zeropose {
 
@@ -34,7 +35,7 @@ struct BallPlateObject {
   Eigen::Vector2d size_mm = Eigen::Vector2d::Zero();
 };
 
-using ObjectTruth = std::variant<PlatesObject, SheetObject, BallPlateObject>;
+using ObjectTruth = std::variant<PlatesObject, SheetObject, BallPlateObject, GapsObject>;
 
 // Grey levels are those at the middle of the picture, where the illumination is 1.
 struct PictureSettings {

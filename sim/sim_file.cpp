@@ -49,13 +49,34 @@ BallPlateObject read_ball_plate(JsonObject& object) {
   return plate;
 }
 
+RoundedBox read_rounded_box(JsonObject& object) {
+  RoundedBox box;
+  const bool sized = object.read("half_mm", std::span<double>(box.half_mm.data(), 2), 1e5);
+  object.read("corner_mm", box.corner_mm, {0, 1e5});
+  if (sized && !(box.half_mm.minCoeff() > box.corner_mm))
+    object.add_mistake("half_mm", "a box that is smaller than its round corners",
+                       "half sizes above corner_mm");
+  return box;
+}
+
+GapsObject read_gaps_object(JsonObject& object) {
+  GapsObject gaps;
+  object.read("opening", [&](JsonObject& box) { gaps.opening = read_rounded_box(box); });
+  object.read("pane", [&](JsonObject& box) { gaps.pane = read_rounded_box(box); });
+  object.read_optional("pane_grey", gaps.pane_grey, NumberRange{0, 255});
+  object.read("hand_pose", gaps.X_RH);
+  object.read("pane_in_hand", gaps.X_HT);
+  return gaps;
+}
+
 // The words, and who reads the rest.
 ObjectTruth read_object_truth(JsonObject& object) {
-  constexpr std::array<std::string_view, 3> kinds{"plates", "sheet", "ball_plate"};
-  constexpr std::array<ObjectTruth (*)(JsonObject&), 3> readers{
+  constexpr std::array<std::string_view, 4> kinds{"plates", "sheet", "ball_plate", "gaps"};
+  constexpr std::array<ObjectTruth (*)(JsonObject&), 4> readers{
       [](JsonObject&) -> ObjectTruth { return PlatesObject{}; },
       [](JsonObject& sheet) -> ObjectTruth { return read_sheet(sheet); },
-      [](JsonObject& plate) -> ObjectTruth { return read_ball_plate(plate); }};
+      [](JsonObject& plate) -> ObjectTruth { return read_ball_plate(plate); },
+      [](JsonObject& gaps) -> ObjectTruth { return read_gaps_object(gaps); }};
   std::size_t kind = 0;
   return object.read_word("kind", kinds, kind) ? readers[kind](object) : PlatesObject{};
 }
@@ -176,6 +197,19 @@ DriveOptions read_drive(JsonObject& object) {
   return drive;
 }
 
+GapDriveOptions read_gap_drive(JsonObject& object) {
+  GapDriveOptions drive;
+  read_components(object, "shift", drive.shift);
+  object.read("robot", [&](JsonObject& robot) { drive.robot = read_errors(robot); });
+  object.read("gain_error", drive.gain_error, NumberRange{0, 1});
+  object.read("even_within_mm", drive.even_within_mm, NumberRange{0, 100, true});
+  object.read_optional("most_motions", drive.most_motions, 1, 1000);
+  object.read_optional("spoilt_every", drive.spoilt_every, 0, 1000);
+  object.read_optional("robot_max_mm", drive.robot_max_mm, NumberRange{0, 1e5, true});
+  object.read_optional("robot_max_deg", drive.robot_max_deg, NumberRange{0, 180, true});
+  return drive;
+}
+
 }  // namespace
 
 void load_marks(SurveyDrive& survey) {
@@ -191,6 +225,7 @@ SimFile load_sim_file(const std::filesystem::path& path) {
     top.read("cameras", [&](JsonObject& cameras) { file.cameras = read_cameras(cameras); });
     top.read_optional("object", [&](JsonObject& object) { file.object = read_object_truth(object); });
     top.read_optional("drive", [&](JsonObject& drive) { file.drive = read_drive(drive); });
+    top.read_optional("gap_drive", [&](JsonObject& drive) { file.gap_drive = read_gap_drive(drive); });
     top.read_each_optional("surveys", [&](JsonObject& survey) {
       file.surveys.push_back(read_survey(survey, path.parent_path()));
     });

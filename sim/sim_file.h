@@ -10,6 +10,7 @@
 
 #include "calib/camera_model.h"
 #include "sim/drive.h"
+#include "sim/gap_drive.h"
 #include "sim/scene.h"
 #include "sim/survey_drive.h"
 
@@ -20,6 +21,7 @@ struct SimFile {
   ObjectTruth object;
   PictureSettings picture;
   std::optional<DriveOptions> drive;
+  std::optional<GapDriveOptions> gap_drive;
   std::vector<SurveyDrive> surveys;
 };
 

@@ -71,6 +71,7 @@ SimulatedCell::SimulatedCell(const Cell& cell, std::vector<Scene> scenes)
     v4l2_ = std::make_unique<V4l2Server>(served_by_v4l2(cell.cameras), draw);
   else
     throw std::runtime_error("the simulated cell serves cameras that are all of driver gige or all of v4l2");
+  if (const auto* gaps = std::get_if<GapsObject>(&scene().object)) move_hand(gaps->robot, gaps->X_RH);
 }
 
 GigeServer& SimulatedCell::gige(const char* fault) {
@@ -89,7 +90,7 @@ void SimulatedCell::render() {
     const auto moved = faults_.moved_cameras.find(camera.name);
     now.moved_cameras[camera.name] = moved == faults_.moved_cameras.end() ? X_CoCn : X_CoCn * moved->second;
   }
-  pictures_.show(shown_, X_WO_, now, target_);
+  pictures_.show(shown_, X_WO_, now, target_ ? target_ : pane());
   if (gige_) gige_->picture_changed();
   if (v4l2_) v4l2_->picture_changed();
 }
@@ -108,6 +109,21 @@ void SimulatedCell::move_hand(std::size_t robot, const Pose& X_RH) {
   const std::lock_guard lock(mutex_);
   hands_[robot] = X_RH;
   render();
+}
+
+void SimulatedCell::cover(std::set<std::string> names) {
+  for (const std::string& name : names) require_mark(name);
+  const std::lock_guard lock(mutex_);
+  faults_.covered = std::move(names);
+  render();
+}
+
+// The pane that a hand holds before a window opening.
+std::optional<Carried> SimulatedCell::pane() const {
+  const auto* gaps = std::get_if<GapsObject>(&scene().object);
+  if (gaps == nullptr) return std::nullopt;
+  const auto hand = hands_.find(gaps->robot);
+  return CarriedPane{gaps->X_WR * (hand == hands_.end() ? gaps->X_RH : hand->second) * gaps->X_HT};
 }
 
 void SimulatedCell::show_target(const Carried& target) {
@@ -132,8 +148,11 @@ void SimulatedCell::require_mark(const std::string& mark) const {
   const auto has = [&](const std::vector<Mark>& marks) {
     return std::ranges::find(marks, mark, &Mark::name) != marks.end();
   };
-  if (std::ranges::none_of(scenes_, [&](const Scene& s) { return has(s.marks) || has(s.fixed_marks); }))
-    throw std::invalid_argument("no mark '" + mark + "' in the cell");
+  const auto knows = [&](const Scene& scene) {
+    const auto* gaps = std::get_if<GapsObject>(&scene.object);
+    return has(scene.marks) || has(scene.fixed_marks) || (gaps != nullptr && gap_spot(*gaps, mark));
+  };
+  if (std::ranges::none_of(scenes_, knows)) throw std::invalid_argument("no mark '" + mark + "' in the cell");
 }
 
 std::size_t SimulatedCell::index_of(const std::string& camera) const {

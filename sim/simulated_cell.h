@@ -55,6 +55,8 @@ class SimulatedCell {
   void show(std::size_t job, const Pose& X_WO);
   // Moves a robot's hand, and the cameras that it carries, to where it truly is.
   void move_hand(std::size_t robot, const Pose& X_RH);
+  // All that covers marks or edges from now on.
+  void cover(std::set<std::string> names);
   // Takes the object away and shows a target of a calibration instead.
   void show_target(const Carried& target);
   Pose pose() const;
@@ -75,6 +77,7 @@ class SimulatedCell {
   void require_mark(const std::string& mark) const;
   std::size_t index_of(const std::string& camera) const;
   void render();  // with mutex_ held
+  std::optional<Carried> pane() const;
 
   const std::vector<Scene> scenes_;  // by job
   mutable std::mutex mutex_;

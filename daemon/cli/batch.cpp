@@ -42,9 +42,13 @@ std::string summary_of(const Cell& cell) {
   for (const CameraOptions& camera : cell.cameras)
     text << "  camera " << camera.name << " at " << place_of(camera) << ", " << camera.width_px << " x "
          << camera.height_px << " px\n";
-  for (const Job& job : cell.jobs)
-    text << "  job " << job.number << " " << job.name << ": " << job.marks.size() << " marks, "
-         << job.views.size() << " views\n";
+  for (const Job& job : cell.jobs) {
+    text << "  job " << job.number << " " << job.name << ": ";
+    if (job.gaps)
+      text << job.gaps->gaps.size() << " gaps\n";
+    else
+      text << job.marks.size() << " marks, " << job.views.size() << " views\n";
+  }
   for (const RobotOptions& robot : cell.robots)
     text << "  robot " << robot.name << ": " << name_of(robot.convention) << ", " << describe(robot.link)
          << "\n";

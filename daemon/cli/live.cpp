@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "daemon/control.h"
+#include "measure/code.h"
 #include "protocol/line_socket.h"
 
 namespace zeropose {
@@ -135,6 +136,26 @@ void print_proposal(const Json& answer) {
          "--measured measured.json --output new.json; zeropose calibration activate\n";
 }
 
+// Each gap, and the motion that evens them; nothing for a job with marks.
+void print_gaps(const Json& answer) {
+  const Json gaps = answer.value("gaps", Json());
+  if (!gaps.is_object()) return;
+  for (const Json& gap : gaps["places"]) {
+    std::cout << "  " << text_or(gap, "camera") << ": gap " << text_or(gap, "gap") << ' ';
+    if (gap.contains("gap_mm"))
+      std::cout << short_text(gap["gap_mm"]) << " mm"
+                << (gap.value("removed", false) ? ", removed as wrong" : "") << '\n';
+    else
+      std::cout << "not measured: " << text_or(gap, "finding") << ": " << text_or(gap, "reason") << '\n';
+  }
+  if (!gaps.contains("motion")) return;
+  std::cout << "  uneven by " << short_text(gaps["uneven_mm"]) << " mm, "
+            << (gaps["even_already"]
+                    ? "even already"
+                    : "after the motion by " + short_text(gaps["predicted_worst_mm"]) + " mm")
+            << "\n";
+}
+
 void print_status(const Json& answer) {
   std::cout << "cell " << text_or(answer, "cell") << (answer["simulated"] ? " (simulated)" : "") << ", job "
             << text_or(answer, "job") << ": " << (answer["ready"] ? "ready" : "NOT READY") << '\n';
@@ -145,19 +166,24 @@ void print_status(const Json& answer) {
   print_proposal(answer);
   if (answer.contains("zero"))
     std::cout << "  zero: " << text_or(answer["zero"], "time") << '\n';
+  else if (answer["zero_state"]["code"] == static_cast<int>(Code::no_procedure))
+    std::cout << "  " << text_or(answer["zero_state"], "reason") << '\n';
   else
     std::cout << "  zero: " << text_or(answer["zero_state"], "name") << ": "
               << text_or(answer["zero_state"], "remedy") << '\n';
+  print_gaps(answer);
 }
 
 void print_measurement(const Json& answer) {
   print_verdict(answer);
   print_proposal(answer);
+  print_gaps(answer);
   if (answer.contains("X_O0O"))
     std::cout << "  x y z mm, rx ry rz deg: " << pose_text(answer["X_O0O"]) << "\n  "
-              << answer["effective_marks"] << " marks in " << answer["effective_cameras"]
-              << " cameras, largest deviation " << short_text(answer["largest_deviation_mm"]) << " mm, sigma "
-              << short_text(answer["sigma_mm"]) << " mm\n";
+              << answer["effective_marks"] << (answer.contains("gaps") ? " gaps in " : " marks in ")
+              << answer["effective_cameras"] << " cameras, largest deviation "
+              << short_text(answer["largest_deviation_mm"]) << " mm, sigma " << short_text(answer["sigma_mm"])
+              << " mm\n";
   for (const auto& mark : answer.value("marks", Json::array()))
     if (mark["finding"] != "found" || mark.value("removed", false))
       std::cout << "  " << text_or(mark, "camera") << ": mark " << text_or(mark, "mark") << ' '

@@ -19,17 +19,42 @@ Json schema() { return parsed(read_file(ZEROPOSE_SOURCE_DIR "/config/cell.schema
 using Visit =
     std::function<void(const std::string& path, const std::string& pointer, const Json& property, bool)>;
 
+// A job has other keys besides where it looks at marks, as the first one of the example does.
+Json required_in(const Json& object) {
+  Json required = object["required"];
+  if (object.contains("then"))
+    required.insert(required.end(), object["then"]["required"].begin(), object["then"]["required"].end());
+  return required;
+}
+
 void walk(const Json& object, const std::string& path, const std::string& pointer, const Visit& visit) {
+  const Json required = required_in(object);
   for (const auto& [key, property] : object["properties"].items()) {
     const std::string key_path = path + (path.empty() ? "" : ".") + key;
     const std::string key_pointer = pointer + "/" + key;
-    const auto& required = object["required"];
     visit(key_path, key_pointer, property,
           std::find(required.begin(), required.end(), key) != required.end());
     if (property.contains("properties")) walk(property, key_path, key_pointer, visit);
     if (property.contains("items") && property["items"].contains("properties"))
       walk(property["items"], key_path + "[]", key_pointer + "/0", visit);
   }
+}
+
+// A job of the other kind, with every key.
+Json gap_job() {
+  Json job = parsed(R"({"name": "gaps", "number": 7, "gaps": {"pane_in_hand": [-1200, 2000, 200, 0, 0, 0],
+    "even": true, "min_gaps": 4, "shape_sigma_mm": 0.1, "tolerance_mm": 0.05, "max_sigma_mm": 0.05,
+    "max_motion": {"x_mm": 5, "y_mm": 5, "rz_deg": 1}, "places": []}})");
+  for (const char* name : {"a", "b", "c", "d"}) {
+    Json place = parsed(R"({"camera": "hand", "window": {"centre_px": [300, 200], "direction_deg": 0,
+      "half_across_px": 80, "half_along_px": 50}, "frame": "bright_to_dark", "pane": "dark_to_bright",
+      "gap_mm": [1, 9], "direction_tolerance_deg": 10, "max_wedge_deg": 2, "min_length_share": 0.4,
+      "min_contrast": 20, "max_blur_px": 3, "plane": {"point_mm": [0, 0, 0], "normal": [0, 0, 1]},
+      "weight": 1, "wanted_mm": 0})");
+    place["name"] = name;
+    job["gaps"]["places"].push_back(place);
+  }
+  return job;
 }
 
 // The example with every optional key present.
@@ -61,6 +86,7 @@ Json full_example() {
   json["jobs"][0]["requirements"]["max_displacement_mm"] = 45;
   json["jobs"][0]["requirements"]["max_step_mm"] = 30;
   json["jobs"][0]["requirements"]["max_step_deg"] = 0.25;
+  json["jobs"].push_back(gap_job());
   json["robots"][0]["axis"] = {{"direction", {1, 0, 0}}, {"zero_mm", 0}};
   json["reference_points"] =
       Json::array({parsed(R"({"name": "r", "cameras": ["camera1"], "kind": "bright_ring", "radius_mm": 5,
@@ -83,6 +109,7 @@ Json full_example() {
     Json robot = example()["robots"][0];
     robot["name"] = "robot" + std::to_string(json["robots"].size() + 1);
     robot["link"] = parsed(link);
+    robot["frame"] = "object_zero";  // the motion of a pane is told in its own frame
     json["robots"].push_back(robot);
   }
   return json;
@@ -100,7 +127,7 @@ std::vector<std::string> mistakes_of(const Json& full) {
 // The place of a key in the example: each driver has keys of its own and a camera of its own there, each type
 // of link a robot.
 Json::json_pointer place_of_key(const Json& full, const std::string& pointer) {
-  for (const std::string list : {"/cameras/", "/robots/", "/jobs/0/marks/"})
+  for (const std::string list : {"/cameras/", "/robots/", "/jobs/", "/jobs/0/marks/"})
     for (std::size_t i = 0; i < 5; ++i) {
       std::string moved = pointer;
       if (moved.starts_with(list + "0/")) moved.replace(0, list.size() + 1, list + std::to_string(i));

@@ -2,72 +2,28 @@
 // more.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
 #include <iostream>
 
 #include "measure/gap.h"
 #include "measure/gap_evening.h"
-#include "tests/measure/pane_scene.h"
-#include "tests/support/gap_scene.h"
+#include "tests/measure/pane_cameras.h"
 
 namespace zeropose {
 namespace {
 
-using Eigen::Vector2d;
-using Eigen::Vector3d;
 using test::degree;
 using test::GapScene;
 using test::in_plane;
-using test::on;
+using test::PaneCamera;
+using test::unevenness_mm;
 
-constexpr double gap_mm = 4;
-
-// H is T: the pane's plane is z = 0 of the hand.
-struct HandCamera {
-  PaneGap place;
-  GapScene scene;
-  Pose X_HG = Pose::Identity();  // x from the frame to the pane, y along the gap, origin in its middle
-};
-
-std::vector<HandCamera> hand_cameras(std::mt19937_64& random) {
-  std::vector<HandCamera> cameras;
-  for (const PaneGap& place : test::pane_gaps(gap_mm)) {
-    HandCamera camera{place, test::random_gap(random)};
-    camera.scene.gap_mm = gap_mm;
-    camera.scene.wedge_rad = 0;
-    camera.X_HG.translation() = on(place.p_T_mm + 0.5 * gap_mm * place.outward_T);
-    camera.X_HG.linear().col(0) = -on(place.outward_T);
-    camera.X_HG.linear().col(1) = Vector3d::UnitZ().cross(-on(place.outward_T));
-    camera.X_HG.linear().col(2) = Vector3d::UnitZ();
-    Pose X_CG = Pose::Identity();
-    X_CG.linear() = camera.scene.R_CG();
-    X_CG.translation() = camera.scene.centre_C_mm();
-    camera.scene.X_HC = camera.X_HG * X_CG.inverse();
-    cameras.push_back(camera);
-  }
-  return cameras;
-}
-
-// The frame, straight at each place and even at identity, while it stands at X_HF.
-GapScene seen(const HandCamera& camera, const Pose& X_HF) {
-  const Pose X_GF = camera.X_HG.inverse() * X_HF;
-  const Vector3d foot = X_GF * on(camera.place.p_T_mm + gap_mm * camera.place.outward_T);
-  const Vector3d outward = X_GF.linear() * on(camera.place.outward_T);
-  GapScene scene = camera.scene;
-  scene.frame_off_mm = -outward.dot(foot) / outward.x() - 0.5 * gap_mm;
-  scene.frame_turn_rad = std::atan2(-outward.y(), -outward.x());
-  return scene;
-}
-
-std::vector<PaneGap> measured(const std::vector<HandCamera>& cameras, const Pose& X_HF,
+std::vector<PaneGap> measured(const std::vector<PaneCamera>& cameras, const Pose& X_HF,
                               std::mt19937_64& random) {
   std::vector<PaneGap> gaps;
-  for (const HandCamera& camera : cameras) {
-    const GapScene scene = seen(camera, X_HF);
+  for (const PaneCamera& camera : cameras) {
+    const GapScene scene = test::seen(camera, X_HF);
     const test::Pixels pixels = test::expose(test::paint(scene), 2, random);
-    GapProblem problem = test::problem_of(scene);
-    problem.search.half_across_px = 80;
+    GapProblem problem = test::wide_problem_of(scene);
     problem.image = pixels.view();
     const GapResult gap = measure_gap(problem);
     EXPECT_EQ(gap.status, GapStatus::ok) << gap.reason;
@@ -75,16 +31,6 @@ std::vector<PaneGap> measured(const std::vector<HandCamera>& cameras, const Pose
                     gap.sigma_mm, 1, 0});
   }
   return gaps;
-}
-
-// The largest deviation of the true gaps from their middle.
-double unevenness_mm(const std::vector<HandCamera>& cameras, const Pose& X_HF) {
-  double low = INFINITY, high = -INFINITY;
-  for (const HandCamera& camera : cameras) {
-    const double off = seen(camera, X_HF).frame_off_mm;
-    low = std::min(low, off), high = std::max(high, off);
-  }
-  return 0.5 * (high - low);
 }
 
 class GapRounds : public testing::Test {
@@ -110,7 +56,7 @@ class GapRounds : public testing::Test {
   }
 
   std::mt19937_64 random_{21};
-  std::vector<HandCamera> cameras_ = hand_cameras(random_);
+  std::vector<PaneCamera> cameras_ = test::pane_cameras(random_);
   Pose X_HF_ = in_plane(0.5, -0.4, 0.06 * degree);
   std::vector<double> left_mm_;
 };
