@@ -33,9 +33,12 @@ struct Wrong {
   bool across = false;  // cameras that look across the gap instead of along it
 };
 
-struct Outcome {
+constexpr int most_motions = 10;
+
+struct Outcome {  // of the cars that became even
   double squares = 0, worst_mm = 0;
-  int count = 0, motions = 0, given_up = 0;
+  int count = 0, motions = 0;
+  int cars = 0, given_up = 0;  // of all
 };
 
 class PaneBudget : public testing::Test {
@@ -159,7 +162,7 @@ Outcome PaneBudget::run(const Wrong& wrong, int cars) {
     std::array<double, 3> gain{};
     for (double& g : gain) g = 1 + wrong.gain * any(random);
     int motions = 0;
-    for (; motions < 20; ++motions) {
+    for (; motions < most_motions; ++motions) {
       std::vector<PaneGap> gaps;
       for (std::size_t i = 0; i < now.places.size(); ++i)
         gaps.push_back(seen_gap(now, task, seen, i, X_OT, wrong.edge_px, random));
@@ -173,12 +176,14 @@ Outcome PaneBudget::run(const Wrong& wrong, int cars) {
           X_OT_meant * from_six_numbers({gain[0] * s.x_mm, gain[1] * s.y_mm, 0, 0, 0, gain[2] * s.rz_deg});
       X_OT = X_OT_meant * drawn(random, wrong.repeat_mm, wrong.repeat_deg);
     }
+    outcome.cars += 1;
+    outcome.given_up += motions == most_motions ? 1 : 0;
+    if (motions == most_motions) continue;
     const double left_mm = truth_mm(now, seen, X_OT);
     outcome.squares += left_mm * left_mm;
     outcome.worst_mm = std::max(outcome.worst_mm, left_mm);
     outcome.count += 1;
     outcome.motions += motions;
-    outcome.given_up += motions == 20 ? 1 : 0;
   }
   return outcome;
 }
@@ -202,8 +207,9 @@ TEST_F(PaneBudget, Table) {
       {.name = "the same, cameras that look across the gap", .tilt_deg = 0.05, .across = true},
       {.name = "frame 0.03 mm off its drawing at each gap", .shape_mm = 0.03},
       {.name = "robot 10 % too much or too little", .gain = 0.1},
-      {.name = "robot repeats to 0.05 mm, 0.003 degrees", .repeat_mm = 0.05, .repeat_deg = 0.003},
-      {.name = "all of that but the shape",
+      {.name = "robot repeats to 0.05 mm by its data sheet", .repeat_mm = 0.015, .repeat_deg = 0.001},
+      {.name = "robot 0.05 mm, 0.003 degrees, one sigma", .repeat_mm = 0.05, .repeat_deg = 0.003},
+      {.name = "all of that, robot by its data sheet, but the shape",
        .edge_px = 0.02,
        .calibration = as_in_practice,
        .grip_mm = 0.4,
@@ -211,22 +217,26 @@ TEST_F(PaneBudget, Table) {
        .height_mm = 0.5,
        .tilt_deg = 0.05,
        .gain = 0.1,
-       .repeat_mm = 0.05,
-       .repeat_deg = 0.003},
+       .repeat_mm = 0.015,
+       .repeat_deg = 0.001},
   };
-  std::printf("| what is wrong | RMS mm | worst mm | motions |\n|---|---|---|---|\n");
-  std::map<std::string, double> rms;
+  std::printf("| what is wrong | RMS mm | worst mm | motions | not even after 10 |\n|---|---|---|---|---|\n");
+  std::map<std::string, double> rms, worst;
   for (const Wrong& row : rows) {
     const Outcome o = run(row, 400);
     rms[row.name] = std::sqrt(o.squares / o.count);
-    std::printf("| %s | %.3f | %.3f | %.1f |%s\n", row.name, rms[row.name], o.worst_mm,
-                double(o.motions) / o.count, o.given_up > 0 ? " given up" : "");
+    worst[row.name] = o.worst_mm;
+    std::printf("| %s | %.3f | %.3f |", row.name, rms[row.name], o.worst_mm);
+    if (row.gain > 0 || row.repeat_mm > 0)
+      std::printf(" %.1f | %.1f %% |\n", double(o.motions) / o.count, 100.0 * o.given_up / o.cars);
+    else
+      std::printf(" | |\n");
   }
   // Each law is one that the page draws a conclusion from.
   EXPECT_LT(rms["edges 0.02 px"], 0.005);
   EXPECT_LT(rms["calibration, all of it"], 0.03);
   EXPECT_GT(rms["the same, cameras that look across the gap"], 5 * rms["car 0.05 degrees out of the plane"]);
-  EXPECT_LT(rms["all of that but the shape"], 0.1);
+  EXPECT_LT(worst["all of that, robot by its data sheet, but the shape"], 0.12);
 }
 
 }  // namespace

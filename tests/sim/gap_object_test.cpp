@@ -59,7 +59,8 @@ TEST(GapTruth, IsTheDistanceOfTheOutlines) {
         nearest = std::min(nearest, (q - p.head<2>()).norm());
       // Half a step of 0.012 mm beside the foot is 0.00001 mm.
       EXPECT_NEAR(true_gap_mm(object, place, X_OT), nearest, 1e-4) << place.name;
-      if (draw == 0) EXPECT_NEAR(nearest, 7, 1e-4);
+      if (draw > 0) continue;
+      EXPECT_NEAR(nearest, 7, 1e-4);
     }
   }
 }
