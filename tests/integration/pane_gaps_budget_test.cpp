@@ -41,6 +41,8 @@ struct Outcome {  // of the cars that became even
   int cars = 0, given_up = 0;  // of all
 };
 
+struct Drawn;
+
 class PaneBudget : public testing::Test {
  protected:
   PaneBudget() {
@@ -54,7 +56,8 @@ class PaneBudget : public testing::Test {
     return cameras;
   }
 
-  Outcome run(const Wrong& wrong, int cars);
+  Drawn drawn_car(const Wrong& wrong, int car, std::mt19937_64& random) const;
+  Outcome run(const Wrong& wrong, int cars) const;
 
   const Cell cell = load_cell(cells + ".json");
   const Scene scene = load_scene(cell, cells + ".sim.json");
@@ -136,50 +139,72 @@ double truth_mm(const GapsObject& object, const Seen& seen, const Pose& X_OT) {
   return (high - low) / 2;
 }
 
-// Cars come, the robot moves until the answer is even. Without errors of the robot it goes on to a thousandth
-// of a mm, so that only what the cameras do not see is left.
-Outcome PaneBudget::run(const Wrong& wrong, int cars) {
+// A car before the robot, and the robot.
+struct Drawn {
+  GapsObject object;
+  Seen seen;
+  Pose X_OT_meant = Pose::Identity(), X_OT = Pose::Identity();
+  Eigen::Vector3d gain = Eigen::Vector3d::Ones();
+};
+
+Drawn PaneBudget::drawn_car(const Wrong& wrong, int car, std::mt19937_64& random) const {
+  std::uniform_real_distribution<double> any(-1, 1);
+  Drawn now{object, {}};
+  now.object.X_HT = cell.jobs[0].gaps->X_HT * drawn(random, wrong.grip_mm, wrong.grip_deg);
+  for (std::size_t i = 0; i < true_cameras.size(); ++i) {
+    now.seen.cameras.push_back(wrong.across ? across(true_cameras[i], object.X_HT, object.places[i])
+                                            : true_cameras[i]);
+    now.seen.shape_mm.push_back(normal(random, wrong.shape_mm));
+  }
+  now.seen.believed =
+      wrong_calibration(now.seen.cameras, wrong.calibration, static_cast<std::uint64_t>(car) / 10 + 1);
+  now.X_OT_meant =
+      from_six_numbers({2 * any(random), 2 * any(random), normal(random, wrong.height_mm),
+                        normal(random, wrong.tilt_deg), normal(random, wrong.tilt_deg), 0.5 * any(random)});
+  now.X_OT = now.X_OT_meant * drawn(random, wrong.repeat_mm, wrong.repeat_deg);
+  for (double& g : now.gain) g = 1 + wrong.gain * any(random);
+  return now;
+}
+
+// The robot moves the tool where it believes the pane to be.
+void move(Drawn& now, const GapTask& task, const Pose& X_TTn, const Wrong& wrong, std::mt19937_64& random) {
+  const SixNumbers s = to_six_numbers(X_TTn);
+  const Pose X_TB = now.object.X_HT.inverse() * task.X_HT;
+  now.X_OT_meant =
+      now.X_OT_meant * X_TB *
+      from_six_numbers({now.gain.x() * s.x_mm, now.gain.y() * s.y_mm, 0, 0, 0, now.gain.z() * s.rz_deg}) *
+      X_TB.inverse();
+  now.X_OT = now.X_OT_meant * drawn(random, wrong.repeat_mm, wrong.repeat_deg);
+}
+
+// How many motions until the answer is even. Without errors of the robot it goes on to a thousandth of a mm,
+// so that only what the cameras do not see is left.
+int evened(Drawn& now, const GapTask& task, const Wrong& wrong, std::mt19937_64& random) {
+  constexpr int exact_motions = 4;  // what they leave no motion takes away
+  const bool exact = wrong.gain == 0 && wrong.repeat_mm == 0;
+  for (int motions = 0; motions < most_motions; ++motions) {
+    std::vector<PaneGap> gaps;
+    for (std::size_t i = 0; i < now.object.places.size(); ++i)
+      gaps.push_back(seen_gap(now.object, task, now.seen, i, now.X_OT, wrong.edge_px, random));
+    // The check against contradictions is not what is asked about here.
+    const EveningResult result = even_gaps({gaps, true, 1, exact ? 0.001 : task.tolerance_mm, 20, 20, 0.1});
+    EXPECT_EQ(result.code, Code::ok) << wrong.name << ": " << result.reason;
+    if (result.even_already || (exact && motions == exact_motions)) return motions;
+    move(now, task, result.X_TTn, wrong, random);
+  }
+  return most_motions;
+}
+
+Outcome PaneBudget::run(const Wrong& wrong, int cars) const {
   std::mt19937_64 random(7);
   Outcome outcome;
-  const GapTask& task = *cell.jobs[0].gaps;
-  const bool robot = wrong.gain > 0 || wrong.repeat_mm > 0;
   for (int car = 0; car < cars; ++car) {
-    GapsObject now = object;
-    now.X_HT = task.X_HT * drawn(random, wrong.grip_mm, wrong.grip_deg);
-    Seen seen;
-    for (std::size_t i = 0; i < true_cameras.size(); ++i) {
-      seen.cameras.push_back(wrong.across ? across(true_cameras[i], object.X_HT, object.places[i])
-                                          : true_cameras[i]);
-      seen.shape_mm.push_back(normal(random, wrong.shape_mm));
-    }
-    seen.believed =
-        wrong_calibration(seen.cameras, wrong.calibration, static_cast<std::uint64_t>(car) / 10 + 1);
-    std::uniform_real_distribution<double> any(-1, 1);
-    const Pose X_OT_first =
-        from_six_numbers({2 * any(random), 2 * any(random), normal(random, wrong.height_mm),
-                          normal(random, wrong.tilt_deg), normal(random, wrong.tilt_deg), 0.5 * any(random)});
-    Pose X_OT_meant = X_OT_first, X_OT = X_OT_meant * drawn(random, wrong.repeat_mm, wrong.repeat_deg);
-    std::array<double, 3> gain{};
-    for (double& g : gain) g = 1 + wrong.gain * any(random);
-    int motions = 0;
-    for (; motions < most_motions; ++motions) {
-      std::vector<PaneGap> gaps;
-      for (std::size_t i = 0; i < now.places.size(); ++i)
-        gaps.push_back(seen_gap(now, task, seen, i, X_OT, wrong.edge_px, random));
-      // The check against contradictions is not what is asked about here.
-      const EveningResult result = even_gaps({gaps, true, 1, robot ? task.tolerance_mm : 0.001, 20, 20, 0.1});
-      EXPECT_EQ(result.code, Code::ok) << wrong.name << ": " << result.reason;
-      if (result.even_already || result.code != Code::ok) break;
-      if (!robot && motions >= 4) break;  // what is left no motion takes away
-      const SixNumbers s = to_six_numbers(result.X_TTn);
-      X_OT_meant =
-          X_OT_meant * from_six_numbers({gain[0] * s.x_mm, gain[1] * s.y_mm, 0, 0, 0, gain[2] * s.rz_deg});
-      X_OT = X_OT_meant * drawn(random, wrong.repeat_mm, wrong.repeat_deg);
-    }
+    Drawn now = drawn_car(wrong, car, random);
+    const int motions = evened(now, *cell.jobs[0].gaps, wrong, random);
     outcome.cars += 1;
     outcome.given_up += motions == most_motions ? 1 : 0;
     if (motions == most_motions) continue;
-    const double left_mm = truth_mm(now, seen, X_OT);
+    const double left_mm = truth_mm(now.object, now.seen, now.X_OT);
     outcome.squares += left_mm * left_mm;
     outcome.worst_mm = std::max(outcome.worst_mm, left_mm);
     outcome.count += 1;
