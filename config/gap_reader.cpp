@@ -96,6 +96,7 @@ bool lies_inside(const GapSearch& search, const CameraOptions& camera) {
 }
 
 void check_gap(const Cell& cell, const GapView& gap, const std::string& path, JsonReading& reading) {
+  if (gap.camera >= cell.cameras.size()) return;  // there are none
   const CameraOptions& camera = cell.cameras[gap.camera];
   const bool known = camera.width_px > 0 && camera.height_px > 0 && gap.search.half_across_px > 0;
   if (known && !lies_inside(gap.search, camera))

@@ -1,5 +1,6 @@
 #include "measure/gap_job.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +15,8 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+
+constexpr double least_redundancy = 0.02;  // of the error of a gap that shows in its deviation
 
 // Takes a verdict over; true when it is ok.
 bool passes(Measurement& measurement, Verdict verdict) {
@@ -123,6 +126,32 @@ Vector3d change_of(const PaneGap& gap) {
           gap.p_T_mm.x() * gap.outward_T.y() - gap.p_T_mm.y() * gap.outward_T.x()};
 }
 
+// Where more gaps are asked for than there are unknowns, each must be checked by the others: of a wrong one
+// nothing would be noticed else. That is so for the only gap left that tells a shift.
+Verdict check_redundancy(const GapTask& task, std::span<const PaneGap> gaps, const std::vector<bool>& used) {
+  const Eigen::Index unknowns = task.even ? 4 : 3;
+  if (task.min_gaps <= unknowns) return {Code::ok, {}};
+  Eigen::MatrixXd J(std::ssize(gaps), unknowns);
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    Eigen::VectorXd row = Eigen::VectorXd::Ones(unknowns);
+    row.head<3>() = change_of(gaps[i]);
+    row(2) /= 1000;  // rad that are as large as mm
+    const double variance = gaps[i].sigma_mm * gaps[i].sigma_mm + task.shape_sigma_mm * task.shape_sigma_mm;
+    J.row(static_cast<Eigen::Index>(i)) = (used[i] ? 1 / std::sqrt(variance) : 0) * row.transpose();
+  }
+  const Eigen::MatrixXd Q =
+      Eigen::HouseholderQR<Eigen::MatrixXd>(J).householderQ() * Eigen::MatrixXd::Identity(J.rows(), unknowns);
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    const double redundancy = 1 - Q.row(static_cast<Eigen::Index>(i)).squaredNorm();
+    if (used[i] && redundancy < least_redundancy)
+      return {Code::hidden_error_too_large, "nothing checks gap " + gaps[i].name +
+                                                " without those that are missing: of an error of it " +
+                                                number(100 * redundancy, 1) + " % would show, at least " +
+                                                number(100 * least_redundancy, 0) + " % are needed"};
+  }
+  return {Code::ok, {}};
+}
+
 // After the evening: whether the robot may do the motion, or better stand where it is.
 Verdict check_motion(const GapTask& task, std::span<const PaneGap> gaps, const std::vector<bool>& used,
                      const EveningResult& evening, Measurement& measurement) {
@@ -187,6 +216,12 @@ Verdict even(const GapTask& task, Measurement& measurement) {
     return {Code::too_few_marks, number(measurement.pose.effective_marks) + " gaps agree, " +
                                      number(task.min_gaps) + " are required (wrong is " +
                                      gaps[found.evening.removed.front()].name + ")"};
+  Verdict checked = check_redundancy(task, gaps, used);
+  if (checked.code != Code::ok) {
+    if (const std::string misses = misses_of(task, found.gaps); !misses.empty())
+      checked.reason += " (" + misses + ")";
+    return checked;
+  }
   return check_motion(task, gaps, used, found.evening, measurement);
 }
 

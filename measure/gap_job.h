@@ -27,8 +27,9 @@ struct GapMeasurement {
 //
 // Codes: marks_invalid (a gap of a camera that is none, or numbers that make no sense), camera_missing,
 // frame_wrong_size; too_few_marks (gaps), or image_saturated, image_blurred where those that the picture
-// spoils would be enough, each with the reason of every gap; those of even_gaps(); gaps_not_even (the shapes
-// do not allow the tolerance), sigma_too_large.
+// spoils would be enough, each with the reason of every gap; those of even_gaps();
+// hidden_error_too_large (a gap that no other checks, though more are asked for than 4, or 3); gaps_not_even
+// (the shapes do not allow the tolerance), sigma_too_large.
 Measurement measure_gaps(const MeasurementProblem& problem);
 
 }  // namespace zeropose

@@ -43,9 +43,10 @@ struct Car {
 
 // Codes that a car with something over an edge may get.
 bool names_a_spoilt_edge(std::uint16_t code) {
-  constexpr std::array codes{Code::too_few_marks,   Code::deviation_not_attributable,
-                             Code::image_saturated, Code::image_blurred,
-                             Code::sigma_too_large, Code::geometry_degenerate};
+  constexpr std::array codes{Code::too_few_marks,         Code::deviation_not_attributable,
+                             Code::image_saturated,       Code::image_blurred,
+                             Code::sigma_too_large,       Code::geometry_degenerate,
+                             Code::hidden_error_too_large};
   return std::ranges::find(codes, static_cast<Code>(code)) != codes.end();
 }
 

@@ -122,16 +122,32 @@ TEST_F(GapJob, EvenGapsNeedNoMotion) {
 }
 
 TEST_F(GapJob, GoesOnWithoutOneGapAndNamesItWhereAllAreNeeded) {
-  hide(scenes[2]);
+  hide(scenes[0]);
   Measurement m = measured();
   ASSERT_EQ(m.code, Code::ok) << m.reason;
-  EXPECT_THAT(m.gaps->used, ElementsAre(0, 1, 3, 4, 5));
+  EXPECT_THAT(m.gaps->used, ElementsAre(1, 2, 3, 4, 5));
   EXPECT_EQ(m.pose.effective_marks, 5);
   job.gaps->min_gaps = 6;
   m = measured();
   EXPECT_EQ(m.code, Code::too_few_marks);
-  EXPECT_THAT(m.reason, HasSubstr("5 gaps were measured, 6 are required (left "));
+  EXPECT_THAT(m.reason, HasSubstr("5 gaps were measured, 6 are required (top1 "));
   EXPECT_TRUE(m.X_O0O.isApprox(Pose::Identity(), 0));
+}
+
+// Left and right alone tell a shift along x: a wrong one of them would not be noticed without the other.
+TEST_F(GapJob, RefusesWhatNothingChecks) {
+  hide(scenes[2]);
+  scenes[3].frame_off_mm += 0.4;
+  Measurement m = measured();
+  EXPECT_EQ(m.code, Code::hidden_error_too_large) << m.reason;
+  EXPECT_THAT(m.reason, HasSubstr("nothing checks gap right"));
+  EXPECT_THAT(m.reason, HasSubstr("(left edge_not_found"));
+  EXPECT_TRUE(m.X_O0O.isApprox(Pose::Identity(), 0));
+  // Whoever asks for no check gets none.
+  job.gaps->min_gaps = 4;
+  m = measured();
+  EXPECT_EQ(m.code, Code::ok) << m.reason;
+  EXPECT_GT(test::unevenness_mm(cameras, m.X_O0O.inverse() * X_HF), 0.1);
 }
 
 TEST_F(GapJob, RemovesAGapThatContradictsTheOthers) {
