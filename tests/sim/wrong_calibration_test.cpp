@@ -104,7 +104,8 @@ TEST_P(ExampleCell, SaysWhatItsCalibrationIs) {
   EXPECT_NE(first_line.find("seed 1"), std::string::npos) << first_line;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ExampleCell, testing::Values("car-body", "press-shop", "gun-check"));
+INSTANTIATE_TEST_SUITE_P(All, ExampleCell,
+                         testing::Values("car-body", "press-shop", "gun-check", "pane-gaps"));
 
 }  // namespace
 }  // namespace zeropose
