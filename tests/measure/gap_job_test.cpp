@@ -113,6 +113,21 @@ TEST_F(GapJob, ThePaneMaySitAnyhowInTheHand) {
   EXPECT_LT(difference(X_HT * turned.X_O0O * X_HT.inverse(), plain.X_O0O).norm(), 1e-6);
 }
 
+TEST_F(GapJob, GoesToTheGapsThatAreWanted) {
+  job.gaps->even = false;
+  for (GapView& gap : job.gaps->gaps) gap.wanted_mm = test::even_gap_mm;
+  Measurement m = measured();
+  ASSERT_EQ(m.code, Code::ok) << m.reason;
+  EXPECT_LT(test::unevenness_mm(cameras, m.X_O0O.inverse() * X_HF), 0.005);
+  for (const double gap_mm : m.gaps->evening.predicted_mm) EXPECT_NEAR(gap_mm, test::even_gap_mm, 0.01);
+  // One that all gaps miss alike: the frame is too wide, and no motion helps.
+  stand(Pose::Identity());
+  for (GapView& gap : job.gaps->gaps) gap.wanted_mm = test::even_gap_mm - 0.3;
+  job.gaps->shape_sigma_mm = 0.3;
+  m = measured();
+  EXPECT_EQ(m.code, Code::gaps_not_even) << m.reason;
+}
+
 TEST_F(GapJob, EvenGapsNeedNoMotion) {
   stand(in_plane(0.02, 0.01, 0));
   const Measurement m = measured();
