@@ -47,7 +47,7 @@ class ExampleLine : public testing::Test {
   // And waits for its socket.
   std::unique_ptr<Process> start_daemon(const std::filesystem::path& cell) const {
     auto daemon =
-        std::make_unique<Process>(std::vector<std::string>{bin("zeroposed"), "--cell", file_of(cell),
+        std::make_unique<Process>(std::vector<std::string>{bin("zeroposed"), "--cell", cell.string(),
                                                            "--state", (folder / "state").string(), "--socket",
                                                            (folder / "zeropose.sock").string()},
                                   folder / "daemon.log");

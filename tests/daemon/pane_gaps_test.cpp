@@ -51,13 +51,13 @@ class PaneGaps : public ExampleLine {
 
 TEST_F(PaneGaps, TheRobotEvensTheGapsOfEveryCar) {
   // The third car has something over an edge.
-  start({"--drive", "--cars", "3"});
+  ASSERT_NO_FATAL_FAILURE(start({"--drive", "--cars", "3"}));
   EXPECT_EQ(simulated->wait(120s), 0) << logs();
   EXPECT_THAT(text_of(folder / "cell.log"), HasSubstr("3 cars:")) << logs();
 }
 
 TEST_F(PaneGaps, TheCommandLineShowsEveryGap) {
-  start({"--control", (folder / "cell.sock").string()});
+  ASSERT_NO_FATAL_FAILURE(start({"--control", (folder / "cell.sock").string()}));
   shift({1, -0.5, 0, 0, 0, 0.2});
   Json answer = json_of({"measure"});
   ASSERT_EQ(answer["code"], 0) << answer << logs();
@@ -90,7 +90,7 @@ TEST_F(PaneGaps, TheCommandLineShowsEveryGap) {
 }
 
 TEST_F(PaneGaps, RefusesByNameWhatItCannotAnswer) {
-  start({"--control", (folder / "cell.sock").string()});
+  ASSERT_NO_FATAL_FAILURE(start({"--control", (folder / "cell.sock").string()}));
   EXPECT_EQ(json_of({"zero"})["code"], static_cast<int>(Code::no_procedure));
   shift({1, -0.5, 0, 0, 0, 0.2});
   for (const char* edge : {"left hidden", "upper left hidden"})
@@ -128,7 +128,7 @@ TEST_F(PaneGaps, AnswersTheRobotAloneThatCarriesThePane) {
   std::ofstream(folder / "two.json") << cell;
   std::filesystem::copy_file(ZEROPOSE_SOURCE_DIR "/config/cells/pane-gaps.calibration.json",
                              folder / "pane-gaps.calibration.json");
-  start({"--control", (folder / "cell.sock").string()}, folder / "two.json");
+  ASSERT_NO_FATAL_FAILURE(start({"--control", (folder / "cell.sock").string()}, folder / "two.json"));
   shift({1, -0.5, 0, 0, 0, 0.2});
   SimulatedRobotOptions options;
   options.port = 1506;
