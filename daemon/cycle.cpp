@@ -285,6 +285,7 @@ MeasureOutcome Cycle::measure(std::optional<std::uint32_t> part, TimePoint deadl
   const Job& job = cell_.jobs[selected_];
   MeasureOutcome outcome;
   outcome.job = &job;
+  last_gaps_.reset();
   Measurement& m = outcome.measurement;
   const auto& zero = zeros_[selected_].record;
   if (!zero && !job.gaps) {

@@ -70,10 +70,10 @@ void HandPictures::make_room(std::size_t position, std::uint32_t part, const Pos
   const Distance off = distance(place.X_RH, X_RH);
   auto& known = place.rounds;
   if (off.mm > same_hand_mm || off.deg > same_hand_deg) known.clear();
-  if (known.empty()) place.X_RH = X_RH;
   std::erase_if(known, [&](const auto& frames) { return oldest_of(frames) < oldest; });
   const auto most = static_cast<std::ptrdiff_t>(rounds) - 1;
   if (std::ssize(known) > most) known.erase(known.begin(), known.end() - most);
+  if (known.empty()) place.X_RH = X_RH;
 }
 
 void HandPictures::take(std::size_t position, std::span<const Frame> frames) {

@@ -89,6 +89,11 @@ std::string movement(const Seen& first, const Seen& second) {
 
 Survey::Survey(const SurveyOptions& options) : options_(options) {
   if (options.cameras.empty()) throw std::invalid_argument("cameras: found none, expected one or more");
+  for (std::size_t i = 1; i < options.cameras.size(); ++i)
+    if (std::ranges::find(options.cameras.begin(), options.cameras.begin() + std::ptrdiff_t(i),
+                          options.cameras[i].index,
+                          &SurveyCamera::index) != options.cameras.begin() + std::ptrdiff_t(i))
+      throw std::invalid_argument("cameras: found " + options.cameras[i].name + " twice");
   if (options.cameras.size() > 1 && std::holds_alternative<BodyTarget>(options.target))
     throw std::invalid_argument("cameras: found more than one, expected the one that looks at the body");
   if (options.positions < 1 || options.positions > most_positions)

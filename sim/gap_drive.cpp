@@ -199,7 +199,7 @@ int drive_gaps(const Cell& cell, const GapsObject& object, const GapDriven& driv
   GapProgram program(cell, object, driven, options, robot);
   GapLog log(options);
   for (int part = 1; !stop && (!options.parts || part <= *options.parts); ++part)
-    log.add(program.run(part, stop));
+    if (const Car car = program.run(part, stop); !stop) log.add(car);
   return log.summary();
 }
 

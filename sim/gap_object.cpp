@@ -37,8 +37,8 @@ FlatOutline::Edge RoundedBoxOutline::edge_at(const Vector2d& q_mm) const {
   return side_ == Side::inside ? edge : Edge{-edge.distance_mm, -edge.normal};
 }
 
-void complete(GapsObject& object, const Cell& cell, std::span<const CalibratedCamera> cameras) {
-  const Job& job = cell.jobs.front();
+void complete(GapsObject& object, const Cell& cell, const Job& job,
+              std::span<const CalibratedCamera> cameras) {
   if (!job.gaps) throw ConfigError({"job " + job.name + " has no gaps, its truth file shows some"});
   for (const GapView& gap : job.gaps->gaps)
     object.places.push_back(rim_place(object, gap, cameras[gap.camera]));

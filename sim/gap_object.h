@@ -50,7 +50,8 @@ struct GapsObject {
 
 // Fills in what the cell says; X_HC of the true cameras. Throws ConfigError for a job without gaps, or a
 // camera that does not look at the pane.
-void complete(GapsObject& object, const Cell& cell, std::span<const CalibratedCamera> cameras);
+void complete(GapsObject& object, const Cell& cell, const Job& job,
+              std::span<const CalibratedCamera> cameras);
 
 // The distance from a place of the rim to the edge of the opening, along the car's surface; negative: the
 // pane lies over the frame.

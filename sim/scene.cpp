@@ -66,7 +66,7 @@ Scene scene_of(const Cell& cell, const Job& job, const std::vector<CalibratedCam
   scene.cameras = cameras;
   scene.marks = job.marks;
   scene.object = truth.object;
-  if (auto* gaps = std::get_if<GapsObject>(&scene.object)) complete(*gaps, cell, scene.cameras);
+  if (auto* gaps = std::get_if<GapsObject>(&scene.object)) complete(*gaps, cell, job, scene.cameras);
   put_on_hands(cell, job, scene);
   for (const View& view : job.views)
     add_view(scene.views, {device_of(job, view.camera, cell.cameras.size()), view.mark});

@@ -171,6 +171,9 @@ void print_status(const Json& answer) {
   else
     std::cout << "  zero: " << text_or(answer["zero_state"], "name") << ": "
               << text_or(answer["zero_state"], "remedy") << '\n';
+  if (answer.contains("gaps") && answer["gaps"]["verdict"]["code"] != 0)
+    std::cout << "  the last measurement was refused: " << text_or(answer["gaps"]["verdict"], "name") << ": "
+              << text_or(answer["gaps"]["verdict"], "reason") << '\n';
   print_gaps(answer);
 }
 

@@ -23,8 +23,8 @@ left,right); a mark may be seen from several positions. The object's frame O is 
 position, or a given one (--frame). Each mark is the mean of its places, weighted with their covariances; a mark whose
 places are further apart than these and --position-sigma-mm (what the robot does not repeat and the sensor's place in
 the hand add) allow is named, and nothing is taught.
---cameras is the calibration file of the cell (X_HC), whose frame is the hand's, or with --sensor x,y,z,rx,ry,rz (X_HS) that
-of the sensor.
+--cameras is the cell's calibration file (each camera with X_HC; the sensor's frame is then the hand's, or with --sensor,
+X_HS, its own), or what calibrate views wrote (X_SC under the key X_WC), which needs --sensor.
 Without --X-WR the world is the robot's base. The marks' places and X_WO go into the cell file (position_mm,
 nominal_pose), each with the names of the positions that see it.
 Example:
@@ -46,8 +46,18 @@ struct Taught {
 };
 
 // The cameras in the sensor's frame.
-std::vector<CalibratedCamera> in_sensor(std::vector<CalibratedCamera> cameras, const Pose& X_HS) {
-  for (CalibratedCamera& camera : cameras) camera.X_WC = X_HS.inverse() * camera.X_WC;
+std::vector<CalibratedCamera> in_sensor(const Options& options, const Pose& X_HS) {
+  std::vector<CalibratedCamera> cameras = load_cameras(options.cameras);
+  for (CalibratedCamera& camera : cameras) {
+    if (camera.on_hand)
+      camera.X_WC = X_HS.inverse() * camera.X_WC;
+    else if (!options.sensor)
+      throw ConfigError(
+          {concat({options.cameras, ": ", camera.name,
+                   ": found X_WC, expected X_HC; a camera in its sensor's frame needs --sensor, "
+                   "the sensor in the hand"})});
+    camera.on_hand = false;
+  }
   return cameras;
 }
 
@@ -62,7 +72,7 @@ Taught taught_of(const Options& options) {
   Taught taught;
   const Pose X_HS = pose_of_option(options.sensor, "--sensor").value_or(Pose::Identity());
   const Pose X_WR = pose_of_option(options.X_WR, "--X-WR").value_or(Pose::Identity());
-  const auto cameras = in_sensor(load_cameras(options.cameras), X_HS);
+  const auto cameras = in_sensor(options, X_HS);
   const NamedPoses hand = load_named_poses(options.robot);
   taught.input = load_sightings(options.observations, cameras, hand);
   std::vector<Pose> X_WS;

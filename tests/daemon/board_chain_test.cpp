@@ -70,8 +70,15 @@ TEST(BoardChain, OnePictureOfTheBodyAndATrackerTellWhereACameraStands) {
   const auto robot = site.simulated({"--survey", "camera1-body"});
   const auto running = site.daemon();
   site.ask({"status", "--wait", "30"});
-  std::this_thread::sleep_for(2s);  // the robot shows the body and waits for a survey
-  site.ask({"snapshot", "--camera", "camera1", "--plain", "--out", site.file("body.png")});
+  // Until the robot shows the body; it then waits for a survey.
+  Finished found;
+  for (int attempt = 0; attempt < 20 && (attempt == 0 || found.status != 0); ++attempt) {
+    std::this_thread::sleep_for(1s);
+    site.ask({"snapshot", "--camera", "camera1", "--plain", "--out", site.file("body.png")});
+    found = site.zeropose({"find-body", "--image", site.file("body.png"), "--body",
+                           site.file("calibration-body.csv"), "--focal-px", "4200"});
+  }
+  ASSERT_EQ(found.status, 0) << found.out << found.err;
   std::ofstream control(site.file("control.csv"));
   control << "mark,xa,ya,za,xb,yb,zb\n";
   int mark = 0;

@@ -98,6 +98,19 @@ TEST_F(Hands, OldRoundsGo) {
   EXPECT_EQ(hands.frames(job, 0)[0].row(0)[0], 2);
 }
 
+// The hand came back, but not quite.
+TEST_F(Hands, ANewPictureBelongsToTheNewPose) {
+  const Pose again = from_six_numbers({0.05, 0, 0, 0, 0, 0});
+  hands.make_room(0, 7, Pose::Identity(), TimePoint(50s), 1);
+  const Frame first[] = {frame(1)};
+  hands.take(0, first);
+  take_all_but(0, 7);
+  hands.make_room(0, 7, again, TimePoint(50s), 1);
+  const Frame second[] = {frame(2)};
+  hands.take(0, second);
+  EXPECT_TRUE(hands.hands(job)[0].isApprox(again));
+}
+
 class Standings : public Hands {
  protected:
   Standing standing() const { return standing_of(cell, job, request); }

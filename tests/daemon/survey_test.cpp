@@ -93,6 +93,8 @@ TEST_F(BallSurvey, OfAStereoSensorNeedsTheBallInBothPictures) {
   EXPECT_EQ(points[0].camera, "camera3");
   EXPECT_EQ(points[1].camera, "camera4");
   EXPECT_LT((points[1].u_px - Vector2d(180, 90)).norm(), 0.1);
+  both.cameras.back() = both.cameras.front();
+  EXPECT_THROW(Survey{both}, std::invalid_argument);
 }
 
 TEST_F(BallSurvey, HasATargetForEveryPositionOrNone) {

@@ -1,5 +1,6 @@
 // Draws docs/images/wheel-lines.png, what a camera of a wheel's sensor sees and what was found in it, and
 // prints what was measured: wheel_picture FOLDER [camber toe [tyre [camera]]].
+#include <algorithm>
 #include <cstdlib>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
@@ -36,7 +37,8 @@ cv::Mat with_findings(cv::Mat picture, const LineArrayResult& array, const Calib
   for (const LightLine& line : array.found) {
     const bool upright = line.course == LineCourse::upright;
     for (const LineCentre& c : line.centres) {
-      const int at = cvRound(c.at), place = cvRound(c.place);
+      const int at = cvRound(c.at);
+      const int place = std::clamp(cvRound(c.place), 0, (upright ? picture.cols : picture.rows) - 1);
       picture.at<cv::Vec3b>(upright ? at : place, upright ? place : at) =
           upright ? radial_colour : across_colour;
     }

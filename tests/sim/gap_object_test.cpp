@@ -187,10 +187,10 @@ TEST(GapScenes, AreRefusedWhereCellAndTruthDoNotFit) {
              marks = load_cell(test::cells + "hand-camera.json");
   Scene scene = test::example("pane-gaps");
   auto object = std::get<GapsObject>(scene.object);
-  EXPECT_THROW(complete(object, marks, scene.cameras), ConfigError);
+  EXPECT_THROW(complete(object, marks, marks.jobs.front(), scene.cameras), ConfigError);
   // From behind the cameras.
   object.X_HT.translation().z() = -4000;
-  EXPECT_THROW(complete(object, gaps, gaps.calibration), ConfigError);
+  EXPECT_THROW(complete(object, gaps, gaps.jobs.front(), gaps.calibration), ConfigError);
 }
 
 }  // namespace
