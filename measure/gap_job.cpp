@@ -43,14 +43,6 @@ std::vector<GapResult> look_at_gaps(const MeasurementProblem& problem) {
   return results;
 }
 
-// What the finder says of edges that the picture spoils, and the code that the picture then gets (M6.1).
-struct Spoilt {
-  MarkStatus status;
-  Code code;
-};
-constexpr std::array spoilt_by{Spoilt{MarkStatus::blurred, Code::image_blurred},
-                               Spoilt{MarkStatus::saturated, Code::image_saturated}};
-
 // Beyond some blur the finder sees no edge that it could call blurred.
 bool without_a_sharp_edge(const ImageView& image, const GapSearch& search) {
   MarkSearch box;

@@ -138,14 +138,6 @@ std::string misses_of(const Job& job, std::span<const MarkFinding> findings,
   return misses;
 }
 
-// What the finder says of marks that the picture spoils, and the code that the picture then gets (M6.1).
-struct Spoilt {
-  MarkStatus status;
-  Code code;
-};
-constexpr std::array spoilt_by{Spoilt{MarkStatus::blurred, Code::image_blurred},
-                               Spoilt{MarkStatus::saturated, Code::image_saturated}};
-
 // The findings, with blurred for what was not found in a window without a sharp edge: beyond some blur the
 // finder sees no mark that it could call so.
 std::vector<MarkFinding> with_blur(std::vector<MarkFinding> findings, std::span<const CameraImage> images,

@@ -1,6 +1,7 @@
 // The pictures of a measurement before anything is looked for in them. Internal to the room.
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -22,5 +23,14 @@ std::vector<PictureHealth> health_of(std::span<const CameraImage> images);
 // camera_missing, frame_wrong_size, and the codes of check_image(). `health` is that of the images.
 Verdict check_picture(std::span<const CameraImage> images, std::span<const PictureHealth> health,
                       std::size_t index, const CalibratedCamera& camera);
+
+// What the finder says of marks and edges that the picture spoils, and the code that the picture then gets
+// (M6.1).
+struct Spoilt {
+  MarkStatus status;
+  Code code;
+};
+inline constexpr std::array spoilt_by{Spoilt{MarkStatus::blurred, Code::image_blurred},
+                                      Spoilt{MarkStatus::saturated, Code::image_saturated}};
 
 }  // namespace zeropose

@@ -2,37 +2,22 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
-#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "tests/support/process.h"
+#include "tests/support/temporary_folder.h"
 
 namespace zeropose {
 
 inline std::string bin(const char* name) { return std::string(ZEROPOSE_BIN_DIR) + "/" + name; }
 
-inline std::string text_of(const std::filesystem::path& file) {
-  std::stringstream text;
-  text << std::ifstream(file).rdbuf();
-  return text.str();
-}
-
 class ExampleLine : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (std::filesystem::temp_directory_path() / "zeropose-line-XXXXXX").string();
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder = name;
-  }
-  void TearDown() override { std::filesystem::remove_all(folder); }
-
   Finished zeropose(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), bin("zeropose"));
     arguments.insert(arguments.end(), {"--socket", (folder / "zeropose.sock").string()});
@@ -58,9 +43,9 @@ class ExampleLine : public testing::Test {
   static std::string file_of(const std::string& cell) {
     return ZEROPOSE_SOURCE_DIR "/config/cells/" + cell + ".json";
   }
-  std::string logs() const { return text_of(folder / "cell.log") + text_of(folder / "daemon.log"); }
+  std::string logs() const { return text_of_file(folder / "cell.log") + text_of_file(folder / "daemon.log"); }
 
-  std::filesystem::path folder;
+  const TemporaryFolder folder;
 };
 
 }  // namespace zeropose

@@ -16,7 +16,7 @@ TEST_F(ExampleLine, GunCheckGivesEveryVerdict) {
   const Finished zero = zeropose({"zero"});
   ASSERT_EQ(zero.status, 0) << zero.out << zero.err;
   EXPECT_EQ(simulated->wait(60s), 0) << logs();
-  EXPECT_NE(text_of(folder / "cell.log").find("4 | beyond its limit and refused: code 501"),
+  EXPECT_NE(text_of_file(folder / "cell.log").find("4 | beyond its limit and refused: code 501"),
             std::string::npos)
       << logs();
 }

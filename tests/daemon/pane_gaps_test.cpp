@@ -53,7 +53,7 @@ TEST_F(PaneGaps, TheRobotEvensTheGapsOfEveryCar) {
   // The third car has something over an edge.
   ASSERT_NO_FATAL_FAILURE(start({"--drive", "--cars", "3"}));
   EXPECT_EQ(simulated->wait(120s), 0) << logs();
-  EXPECT_THAT(text_of(folder / "cell.log"), HasSubstr("3 cars:")) << logs();
+  EXPECT_THAT(text_of_file(folder / "cell.log"), HasSubstr("3 cars:")) << logs();
 }
 
 TEST_F(PaneGaps, TheCommandLineShowsEveryGap) {
@@ -119,7 +119,7 @@ TEST_F(PaneGaps, RefusesByNameWhatItCannotAnswer) {
 
 // A second robot of the cell asks for the same job.
 TEST_F(PaneGaps, AnswersTheRobotAloneThatCarriesThePane) {
-  Json cell = Json::parse(text_of(file_of("pane-gaps")), nullptr, true, true);
+  Json cell = Json::parse(text_of_file(file_of("pane-gaps")), nullptr, true, true);
   Json robot = cell["robots"][0];
   robot["name"] = "robot2";
   robot["link"]["unit"] = 2;
