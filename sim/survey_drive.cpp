@@ -15,6 +15,8 @@ constexpr double begins_within_s = 60;
 constexpr int tries = 3;
 // The robot's own space: no target is farther from its first place than its own others are, and this.
 constexpr double room_mm = 50;
+// A survey's positions are none of a job's; while nobody surveys they are refused.
+constexpr std::uint16_t no_job = 0;
 
 Carried carried_by(const BallInHand& ball, const Pose& X_WH) {
   return CarriedBall{X_WH * ball.p_HT_mm, ball.radius_mm, ball.grey};
@@ -68,8 +70,7 @@ class Surveyor {
     const Pose X_WH = cell_.robots.at(survey_.robot).X_WR * X_RH_true;
     surveyed_.move_hand(survey_.robot, X_RH_true);
     std::visit([&](const auto& target) { show(target, X_WH); }, survey_.target);
-    return robot_.at_position(static_cast<std::uint16_t>(cell_.jobs.front().number), 0,
-                              static_cast<std::int32_t>(position + 1), X_RH);
+    return robot_.at_position(no_job, 0, static_cast<std::int32_t>(position + 1), X_RH);
   }
 
   void show(const StandingObject& object, const Pose&) {
@@ -125,7 +126,7 @@ int drive_survey(const Cell& cell, const SurveyDrive& survey, const SurveyedCell
                  const std::atomic<bool>& stop) {
   Surveyor surveyor(cell, survey, surveyed);
   bool told = false;
-  // Somebody looks at the positions, whatever he sees.
+  // Somebody surveys, whatever he sees.
   const auto begun = [&] {
     told = surveyor.target().has_value();
     if (told) return true;

@@ -60,8 +60,10 @@ class Site {
                                        "--points",  file(camera + "-points.csv")};
     arguments.insert(arguments.end(), more.begin(), more.end());
     ask(arguments);
-    EXPECT_EQ(robot->wait(std::chrono::seconds(20)), 0)
-        << text_of_file(folder / "cell.log") << text_of_file(folder / "daemon.log");
+    const auto driven = robot->wait(std::chrono::seconds(20));
+    if (testing::Test::HasFatalFailure() || driven != 0)
+      FAIL() << program << ": the robot's status is " << driven.value_or(-1) << '\n'
+             << text_of_file(folder / "cell.log") << text_of_file(folder / "daemon.log");
     running->signal(SIGTERM);
     EXPECT_EQ(running->wait(std::chrono::seconds(20)), 0);
   }
