@@ -3,7 +3,7 @@ find_package(Threads REQUIRED)
 
 add_library(zeropose_flags INTERFACE)
 target_include_directories(zeropose_flags INTERFACE ${PROJECT_SOURCE_DIR})
-if(NOT ZEROPOSE_SANITIZE)  # to warn of the same files once more costs a twelfth of the second build
+if(NOT ZEROPOSE_SANITIZE OR ZEROPOSE_FUZZ)  # to warn of the same files once more costs a twelfth of the second build
   target_compile_options(zeropose_flags INTERFACE -Wall -Wextra -Wconversion -Wshadow -Wnon-virtual-dtor)
 endif()
 target_compile_options(zeropose_flags INTERFACE -Werror)
