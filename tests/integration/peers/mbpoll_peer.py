@@ -11,7 +11,8 @@ from server import arguments, running
 
 
 def mbpoll(options, port, *more):
-    call = ["mbpoll", "-m", "tcp", "-p", str(port), "-a", str(options.unit), "-0", "-1", *more]
+    # By default it waits for an answer for 1 s, which a busy machine may need.
+    call = ["mbpoll", "-m", "tcp", "-p", str(port), "-a", str(options.unit), "-o", "8", "-0", "-1", *more]
     return subprocess.run(call, capture_output=True, text=True, timeout=20, check=False)
 
 
@@ -25,6 +26,16 @@ def read_block(options, port, kind):
     return block
 
 
+def mirrors_hold(options, port):
+    """Holding registers mirror input registers. A camera that is lost for a moment changes the block in between."""
+    for _ in range(5):
+        first, mirror, last = (vars(read_block(options, port, kind)) for kind in "343")
+        if first == last:
+            assert mirror == first, (mirror, first)
+            return
+    raise AssertionError("the block did not stay as it is for two reads")
+
+
 def main():
     options = arguments(__doc__).parse_args()
     if not shutil.which("mbpoll"):
@@ -33,7 +44,7 @@ def main():
     with running(options) as port:
         before = read_block(options, port, "3")
         assert before.epoch != 0 and not before.status & (VALID | NOT_OK | BUSY)
-        assert vars(read_block(options, port, "4")) == vars(before), "holding registers mirror input registers"
+        mirrors_hold(options, port)
         partial = mbpoll(options, port, "-r", "14", "-c", "16", "-t", "3", options.host)
         assert "Illegal data address" in partial.stdout + partial.stderr, partial
         registers = [str(value) for value in command(4711, MEASURE, job=1)]
