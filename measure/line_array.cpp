@@ -10,19 +10,31 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr int crossing_steps = 30;
-constexpr double crossing_close_px = 1e-6;
+constexpr int crossing_halvings = 30;
 constexpr double most_turn = 0.5;  // sine of 30 degrees
 
-// By turns along one line and the other. Nothing where they do not meet between their ends.
+// Pixel by pixel along the upright line until it has passed the level one, then between by halves: where they
+// meet their centres pull each other, so that steps from one line to the other need not settle. Nothing where
+// they do not meet between their ends.
 std::optional<Vector2d> crossing_of(const LightLine& upright, const LightLine& level) {
-  double v = (level.centres.front().place + level.centres.back().place) / 2;
-  for (int step = 0; step < crossing_steps; ++step) {
+  const auto above = [&](double v) {  // px; below 0: past the level line
     const auto u = upright.place_at(v);
-    const auto next = u ? level.place_at(*u) : std::nullopt;
-    if (!next) return std::nullopt;
-    if (std::abs(*next - v) < crossing_close_px) return Vector2d(*u, *next);
-    v = *next;
+    const auto there = u ? level.place_at(*u) : std::nullopt;
+    return there ? std::optional(*there - v) : std::nullopt;
+  };
+  const auto [highest, lowest] = std::ranges::minmax(level.centres, {}, &LineCentre::place);
+  const double end = std::min(upright.to(), lowest.place + 1);
+  for (double v = std::max(upright.from(), highest.place - 1); v < end; v += 1) {
+    double from = v, to = std::min(v + 1, end);
+    const auto before = above(from), after = above(to);
+    if (!before || !after || *before < 0 || *after > 0) continue;
+    for (int step = 0; step < crossing_halvings; ++step) {
+      const double middle = (from + to) / 2;
+      const auto there = above(middle);
+      if (!there) return std::nullopt;
+      (*there >= 0 ? from : to) = middle;
+    }
+    return Vector2d(*upright.place_at(from), from);
   }
   return std::nullopt;
 }
