@@ -91,6 +91,12 @@ constexpr std::array table{
         Code::marks_invalid, "marks_invalid",
         "The marks or what was found of them hold numbers that cannot be used.",
         "Check the job in the cell file with check-config; if it is fine, keep the record and report it."},
+    CodeText{
+        Code::lines_not_found, "lines_not_found",
+        "The projector's lines on the tyre, or the tyre's profile along them, were not all found.",
+        "Look at the pictures, the reason names the camera and the line: is the tyre clean, of the type of "
+        "the job and in its place? Do all projectors draw all their lines? Are lenses and projectors "
+        "clean?"},
 
     CodeText{
         Code::geometry_degenerate, "geometry_degenerate",
@@ -131,11 +137,10 @@ constexpr std::array table{
     CodeText{Code::value_out_of_range, "value_out_of_range",
              "A value of the correction does not fit into the robot's number format.",
              "Check the frame and the robot's pose in the cell file: the correction is implausibly large."},
-    CodeText{
-        Code::limit_displacement, "limit_displacement",
-        "An application point is displaced further than the job allows.",
-        "Check how the object stands; the reason names the point. Change the limit only if the robot can "
-        "really go there."},
+    CodeText{Code::limit_displacement, "limit_displacement",
+             "The object, or an application point of it, is displaced further than the job allows.",
+             "Check how the object stands; the reason says more. Change the limit only if the robot can "
+             "really go there."},
     CodeText{
         Code::step_too_large, "step_too_large",
         "The object stands further from where the last valid result put it than the job allows.",

@@ -38,6 +38,7 @@ enum class Code : std::uint16_t {
   too_few_marks_in_camera = 302,
   too_few_cameras = 303,
   marks_invalid = 304,
+  lines_not_found = 305,
 
   geometry_degenerate = 401,
   not_converged = 402,

@@ -11,6 +11,7 @@
 #include "calib/camera_model.h"
 #include "measure/gap_task.h"
 #include "measure/marks.h"
+#include "measure/wheel_task.h"
 
 namespace zeropose {
 
@@ -86,7 +87,9 @@ struct Job {
   double system_sigma_px = 0;      // calibration errors that remain after zero (M6.3)
   std::vector<ApplicationPoint> application_points;
   Requirements requirements;
-  std::optional<GapTask> gaps{};  // such a job has no marks and no positions, and needs no zero measurement
+  // One of these in a job without marks and positions:
+  std::optional<GapTask> gaps{};     // it needs no zero measurement
+  std::optional<WheelTask> wheel{};  // of X_O0O there are the shifts and the tilts, camber rx and toe ry
 };
 
 // A camera at one of the job's positions.
@@ -105,6 +108,17 @@ inline std::vector<HandEye> hand_eyes(const Job& job) {
 // The camera of the cell that takes the picture of a view, for a cell of so many cameras.
 inline std::size_t device_of(const Job& job, std::size_t view_camera, std::size_t cell_cameras) {
   return view_camera < cell_cameras ? view_camera : hand_eyes(job).at(view_camera - cell_cameras).camera;
+}
+
+// The cameras that the job's views, gaps or wheel name, as View::camera counts them; some more than once.
+inline std::vector<std::size_t> cameras_of(const Job& job) {
+  std::vector<std::size_t> cameras;
+  for (const View& view : job.views) cameras.push_back(view.camera);
+  if (job.gaps)
+    for (const GapView& gap : job.gaps->gaps) cameras.push_back(gap.camera);
+  if (job.wheel)
+    for (const WheelEyes& eyes : job.wheel->sensors) cameras.insert(cameras.end(), {eyes.left, eyes.right});
+  return cameras;
 }
 
 // Fewer marks fix no pose, whatever the requirements say.

@@ -11,6 +11,7 @@
 #include "measure/picture_checks.h"
 #include "measure/security.h"
 #include "measure/sharpness.h"
+#include "measure/wheel_job.h"
 
 namespace zeropose {
 namespace {
@@ -86,7 +87,7 @@ bool lies_in(const Pose& X_WP, const Pose& X_WO) {
 }
 
 Verdict check_zero(const Job& job, const Zero& zero) {
-  if (zero.compensation_O_mm.empty())
+  if (job.wheel ? !(zero.profile_radius_mm > 0) : zero.compensation_O_mm.empty())
     return {Code::zero_missing, "no zero measurement was made for job " + job.name};
   if (zero.compensation_O_mm.size() != job.marks.size())
     return {Code::zero_outdated, "the zero measurement knows " + number(zero.compensation_O_mm.size()) +
@@ -108,14 +109,17 @@ Verdict check_zero(const Job& job, const Zero& zero) {
 Verdict check_images(std::span<const CameraImage> images, std::span<const PictureHealth> health,
                      const Job& job, std::span<const CalibratedCamera> cameras) {
   std::vector<bool> checked(cameras.size());
-  for (const View& view : job.views) {
-    if (view.camera >= cameras.size() || view.mark >= job.marks.size())
-      return {Code::marks_invalid, "job " + job.name + " names a camera or a mark that does not exist"};
-    if (checked[view.camera]) continue;
-    checked[view.camera] = true;
-    Verdict verdict = check_picture(images, health, view.camera, cameras[view.camera]);
+  for (const std::size_t camera : cameras_of(job)) {
+    if (camera >= cameras.size())
+      return {Code::marks_invalid, "job " + job.name + " names a camera that does not exist"};
+    if (checked[camera]) continue;
+    checked[camera] = true;
+    Verdict verdict = check_picture(images, health, camera, cameras[camera]);
     if (verdict.code != Code::ok) return verdict;
   }
+  for (const View& view : job.views)
+    if (view.mark >= job.marks.size())
+      return {Code::marks_invalid, "job " + job.name + " names a mark that does not exist"};
   return {Code::ok, {}};
 }
 
@@ -327,6 +331,11 @@ Measurement measure(const MeasurementProblem& problem) {
   if (!passes(measurement, check_images(images, measurement.health, job, cameras))) return measurement;
   look_at_references(measurement, problem);
   if (!cameras_stand(measurement, false)) return measurement;
+  if (job.wheel) {
+    measure_wheel_of(measurement, problem);
+    if (measurement.code == Code::ok) cameras_stand(measurement, true);
+    return measurement;
+  }
   const Job now = compensated(job, zero);
   if (!find_all(measurement, images, now, cameras, zero.X_WO0)) return measurement;
   if (!cameras_stand(measurement, true)) return measurement;

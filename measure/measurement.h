@@ -12,6 +12,7 @@
 #include "measure/picture_health.h"
 #include "measure/pose.h"
 #include "measure/references.h"
+#include "measure/wheel.h"
 #include "measure/zero.h"
 
 namespace zeropose {
@@ -35,8 +36,9 @@ struct Measurement {
   double hidden_mm = 0;             // what one wrong mark could do at the worst application point unnoticed
   std::vector<MarkFinding> reference_findings;  // one per view of the references
   ReferenceCheck references;
-  std::optional<GapMeasurement>
-      gaps;  // of a job that evens gaps (measure/gap_job.h); it has none of the marks
+  // Of a job without marks:
+  std::optional<GapMeasurement> gaps{};  // measure/gap_job.h
+  std::optional<WheelResult> wheel{};    // measure/wheel_job.h
 };
 
 // Where find_job_marks() looks: one search per view of the job (the snapshot draws them). The window reaches
@@ -72,7 +74,7 @@ struct MeasurementProblem {
 // after them. The first check that fails names the code. Marks are searched around the zero pose and used
 // where the zero measurement's compensation puts them.
 //
-// A job that evens gaps goes the way of measure_gaps().
+// A job that evens gaps goes the way of measure_gaps(), one of a wheel that of measure_wheel_of().
 //
 // image_blurred and image_saturated also where the job's requirements on marks fail only because the finder
 // calls marks blurred or saturated: with those they would be met.

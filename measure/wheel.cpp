@@ -68,27 +68,14 @@ class WheelMeasurement {
     return true;
   }
 
-  // Where the middle of the sensor's radial line is on the nominal wheel, and its outward direction.
-  Vector3d middle_N(const WheelSensor& sensor) const {
-    const double radius_mm = (problem_.tyre.min_radius_mm + problem_.tyre.max_radius_mm) / 2;
-    return radius_mm * Vector3d(std::cos(sensor.angle_rad), std::sin(sensor.angle_rad), 0);
-  }
-
   bool order_one(const WheelSensor& sensor, const CalibratedCamera& camera, const ImageView& image,
                  LineArrayResult& lines) {
-    const Vector3d middle = middle_N(sensor), outwards = middle.normalized();
-    const Pose X_CN = camera.X_WC.inverse() * problem_.X_WN;
-    const double side = (problem_.X_WN.inverse() * camera.X_WC.translation()).z() > 0 ? 1 : -1;
-    const Vector3d right = (-side * Vector3d::UnitZ()).cross(outwards);
-    const auto at = project(camera.model, X_CN * middle);
-    const auto to_right = project(camera.model, X_CN * (middle + step_mm * right));
-    const auto out = project(camera.model, X_CN * (middle + step_mm * outwards));
-    if (!at || !to_right || !out || !in_image(camera.model, *at))
+    const auto array = line_array_problem(problem_, sensor.angle_rad, camera, image);
+    if (!array)
       return fail(WheelStatus::wrong_problem, "camera " + camera.name +
                                                   " does not see the nominal side wall at " +
                                                   number(sensor.angle_rad * degrees_per_radian, 0) + " deg");
-    LineArrayProblem array{image, problem_.layout, problem_.search, *to_right - *at, *out - *at};
-    lines = order_lines(array);
+    lines = order_lines(*array);
     if (lines.status == LineArrayStatus::ok) return true;
     result_.order = lines.status;
     const bool wrong = lines.status == LineArrayStatus::wrong_problem;
@@ -327,6 +314,20 @@ std::string_view name_of(WheelStatus status) {
       return "out_of_range";
   }
   return "?";
+}
+
+std::optional<LineArrayProblem> line_array_problem(const WheelProblem& problem, double angle_rad,
+                                                   const CalibratedCamera& camera, const ImageView& image) {
+  const double radius_mm = (problem.tyre.min_radius_mm + problem.tyre.max_radius_mm) / 2;
+  const Vector3d outwards(std::cos(angle_rad), std::sin(angle_rad), 0), middle = radius_mm * outwards;
+  const Pose X_CN = camera.X_WC.inverse() * problem.X_WN;
+  const double side = (problem.X_WN.inverse() * camera.X_WC.translation()).z() > 0 ? 1 : -1;
+  const Vector3d right = (-side * Vector3d::UnitZ()).cross(outwards);
+  const auto at = project(camera.model, X_CN * middle);
+  const auto to_right = project(camera.model, X_CN * (middle + step_mm * right));
+  const auto out = project(camera.model, X_CN * (middle + step_mm * outwards));
+  if (!at || !to_right || !out || !in_image(camera.model, *at)) return std::nullopt;
+  return LineArrayProblem{image, problem.layout, problem.search, *to_right - *at, *out - *at};
 }
 
 WheelResult measure_wheel(const WheelProblem& problem) { return WheelMeasurement(problem).run(); }

@@ -13,6 +13,7 @@
 #include "measure/line_array.h"
 #include "measure/tyre_profile.h"
 #include "measure/wheel_plane.h"
+#include "measure/wheel_task.h"
 
 namespace zeropose {
 
@@ -22,13 +23,6 @@ struct WheelSensor {
   double angle_rad = 0;  // of its middle radial line, about z of W from x to y
   CalibratedCamera left, right;
   ImageView left_image, right_image;
-};
-
-// What is known of the tyre before it is measured.
-struct ExpectedTyre {
-  double min_radius_mm = 0, max_radius_mm = 0;         // the side wall, 0 < min < max
-  double unevenness_mm = 0.15, out_of_round_mm = 0.3;  // see WheelPlaneProblem
-  std::optional<double> profile_radius_mm;             // take the profile next to this radius, as at zero
 };
 
 struct WheelProblem {
@@ -78,5 +72,10 @@ struct WheelResult {
 //
 // Numbers are filled in as far as they are known, whatever the status; they count only when it is ok.
 WheelResult measure_wheel(const WheelProblem& problem);
+
+// How the lines are looked for in the image of one camera, of a sensor at that angle. nullopt: the camera
+// does not see the nominal side wall there.
+std::optional<LineArrayProblem> line_array_problem(const WheelProblem& problem, double angle_rad,
+                                                   const CalibratedCamera& camera, const ImageView& image);
 
 }  // namespace zeropose

@@ -16,6 +16,7 @@ struct Zero {
   Pose X_WO0 = Pose::Identity();
   std::vector<Eigen::Vector3d> compensation_O_mm;  // shift of each mark of the job
   std::vector<Observation> references{};           // where the reference points were (measure/references.h)
+  double profile_radius_mm = 0;                    // of a wheel: where its nine points lie; else 0
 };
 
 // The job with its marks where the zero measurement puts them. Precondition: a compensation for each mark.
