@@ -15,6 +15,7 @@
 #include "config/json_reader.h"
 #include "config/robot_link.h"
 #include "config/text.h"
+#include "config/wheel_reader.h"
 
 namespace zeropose {
 namespace {
@@ -182,12 +183,13 @@ void add_calibration(Cell& cell, const std::string& text, const std::string& nam
 }
 
 // Points that are known by their pixel get a place on its line of sight; all must lie in the pictures. Planes
-// of gaps must be seen.
+// of gaps and side walls must be seen.
 void check_with_calibration(Cell& cell, const std::string& name, std::vector<std::string>& mistakes) {
   if (!mistakes.empty()) return;
   JsonReading reading(name);
   put_references_in_place(cell, reading);
   check_gap_planes(cell, reading);
+  check_wheel_sight(cell, reading);
   append(mistakes, reading.mistakes());
 }
 

@@ -1,6 +1,7 @@
 #include "config/cell_checks.h"
 #include "config/gap_reader.h"
 #include "config/text.h"
+#include "config/wheel_reader.h"
 #include "protocol/link_checks.h"
 
 #include <algorithm>
@@ -109,6 +110,10 @@ void check_jobs(const Cell& cell, JsonReading& reading) {
     const std::string path = path_of("jobs", i);
     if (cell.jobs[i].gaps) {
       check_gaps(cell, cell.jobs[i], path + ".gaps", reading);
+      continue;
+    }
+    if (cell.jobs[i].wheel) {
+      check_wheel(*cell.jobs[i].wheel, path + ".wheel", reading);
       continue;
     }
     check_unique(cell.jobs[i].marks, path + ".marks", "name", name_in_quotes, reading);

@@ -7,6 +7,7 @@
 
 #include "config/gap_reader.h"
 #include "config/text.h"
+#include "config/wheel_reader.h"
 
 namespace zeropose {
 namespace {
@@ -124,13 +125,15 @@ HandPosition read_position(JsonObject& object, const std::vector<Mounted>& camer
   return position;
 }
 
-// A job looks at marks or evens gaps.
-void refuse_keys_of_marks(JsonObject& object) {
-  for (const char* key : {"nominal_pose", "planar", "positions", "positions_within_s", "search_mm",
-                          "system_sigma_px", "marks", "application_points", "requirements", "limits"}) {
+// A job looks at marks, evens gaps or measures a wheel; `kind` is the key of what it does instead of marks.
+void refuse_keys_of_others(JsonObject& object, std::string_view kind) {
+  for (const char* key :
+       {"gaps", "wheel", "nominal_pose", "planar", "positions", "positions_within_s", "search_mm",
+        "system_sigma_px", "marks", "application_points", "requirements", "limits"}) {
+    if (key == kind) continue;
     object.skip(key);
     if (object.has(key))
-      object.add_mistake(key, "a key of jobs with marks beside gaps", "one of both kinds of job");
+      object.add_mistake(key, concat({"a key of another kind of job beside ", kind}), "one kind of job");
   }
 }
 
@@ -201,17 +204,22 @@ Job read_job(JsonObject& object, const std::vector<Mounted>& cameras) {
   object.read("name", job.name);
   object.read("number", job.number, 1, 65535);
   if (object.read_optional("gaps", [&](JsonObject& member) { job.gaps = read_gaps(member, cameras); })) {
-    refuse_keys_of_marks(object);
+    refuse_keys_of_others(object, "gaps");
     return job;
   }
   job.gaps.reset();
+  if (object.read_optional("wheel", [&](JsonObject& member) { read_wheel(member, cameras, job); })) {
+    refuse_keys_of_others(object, "wheel");
+    return job;
+  }
+  job.wheel.reset();
   object.read("nominal_pose", job.X_WO_nominal);
   Pose X_WP = Pose::Identity();
   if (object.read_optional("planar", X_WP)) job.X_WP_planar = X_WP;
   const Eyes eyes = read_positions(object, cameras, job);
   object.read("search_mm", job.search_mm, NumberRange{0, 10000, true});
   object.read_optional("system_sigma_px", job.system_sigma_px, NumberRange{0, 100});
-  if (!object.has("marks")) object.add_mistake("marks", "no such key", "the job's marks, or gaps");
+  if (!object.has("marks")) object.add_mistake("marks", "no such key", "the job's marks, or gaps, or wheel");
   object.read_each_optional("marks", object.has("planar") ? 2 : 3, [&](JsonObject& member) {
     const NamedMark named = read_mark(member);
     add_views(member, named, eyes, job.marks.size(), job.views);

@@ -65,16 +65,18 @@ Json json_of(const ZeroRecord& record) {
     compensation.push_back(json_of({shift.data(), 3}));
   Json references = Json::array();
   for (const Observation& reference : record.zero.references) references.push_back(json_of(reference));
-  return {{"job", record.job},
-          {"time_utc", record.time_utc},
-          {"frames", record.frames},
-          {"config_hash", hash_text(record.config_hash)},
-          {"calibration_hash", hash_text(record.calibration_hash)},
-          {"X_WO0", {six.x_mm, six.y_mm, six.z_mm, six.rx_deg, six.ry_deg, six.rz_deg}},
-          {"X_WO0_rows", json_of({rows.data(), 12})},
-          {"spread", json_of({record.spread.data(), 6})},
-          {"compensation_mm", compensation},
-          {"references", references}};
+  Json json{{"job", record.job},
+            {"time_utc", record.time_utc},
+            {"frames", record.frames},
+            {"config_hash", hash_text(record.config_hash)},
+            {"calibration_hash", hash_text(record.calibration_hash)},
+            {"X_WO0", {six.x_mm, six.y_mm, six.z_mm, six.rx_deg, six.ry_deg, six.rz_deg}},
+            {"X_WO0_rows", json_of({rows.data(), 12})},
+            {"spread", json_of({record.spread.data(), 6})},
+            {"compensation_mm", compensation},
+            {"references", references}};
+  if (record.zero.profile_radius_mm > 0) json["profile_radius_mm"] = record.zero.profile_radius_mm;
+  return json;
 }
 
 void read_hash(JsonObject& object, std::string_view key, std::uint32_t& hash) {
@@ -134,6 +136,7 @@ ZeroRecord read_zero(JsonObject& object) {
   object.read("compensation_mm", record.zero.compensation_O_mm, largest);
   object.read_each("references", 0,
                    [&](JsonObject& member) { record.zero.references.push_back(read_reference(member)); });
+  object.read_optional("profile_radius_mm", record.zero.profile_radius_mm, NumberRange{0, largest, true});
   return record;
 }
 
@@ -156,6 +159,7 @@ std::string why_outdated(const ZeroRecord& record, const Cell& cell, const Job& 
   if (config && calibration) return "another cell file and another calibration";
   if (config) return "another cell file";
   if (calibration) return "another calibration";
+  if (job.wheel && !(record.zero.profile_radius_mm > 0)) return "no profile of a tyre";
   const std::size_t marks = record.zero.compensation_O_mm.size();
   if (marks == job.marks.size()) return {};
   return concat({std::to_string(marks), " marks, the job has ", std::to_string(job.marks.size())});
