@@ -15,8 +15,11 @@ class Canvas {
   Canvas(const PixelRays& rays, double blur_sigma_px, double grey);
 
   const CameraModel& camera() const { return rays_.camera(); }
+  const PixelRays& rays() const { return rays_; }
   Canvas like(double grey) const { return {rays_, blur_sigma_px_, grey}; }  // another one of the same camera
   void clear(double grey) { std::ranges::fill(picture_, static_cast<float>(grey)); }
+  // What was made elsewhere: as many grey levels, row by row, blurred already.
+  void show(std::vector<float> picture) { picture_ = std::move(picture); }
 
   // Things of a frame F that need not be exact.
   void paint(const Sheet& sheet, const Pose& X_CF);

@@ -135,10 +135,11 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--cell", options.cell, "the cell file; the truth is read from CELL.sim.json beside it")
       ->required();
   app.add_option("--shift", options.shift, "where the object stands from its nominal pose: x,y,z,rx,ry,rz");
-  app.add_option("--fault", options.faults,
-                 "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK,\n"
-                 "cover-mark:'GAP dirt' (glint, hidden, taped), "
-                 "camera-moved:CAMERA");
+  app.add_option(
+      "--fault", options.faults,
+      "at the start: camera-dead:CAMERA, lose-packets:CAMERA, cover-mark:MARK, wrong-mark:MARK,\n"
+      "cover-mark:'GAP dirt' (glint, hidden, taped), cover-mark:'SENSOR dirt 1', 'SENSOR line 1',\n"
+      "camera-moved:CAMERA");
   app.add_option("--survey", options.survey,
                  "run the robot's program of this survey of the truth file: a camera's name, or its own");
   app.add_option("--control", options.control, "Unix socket that moves the object and injects faults");

@@ -4,6 +4,7 @@
 #include "sim/gap_look.h"
 #include "sim/plates_look.h"
 #include "sim/steel_sheet_look.h"
+#include "sim/wheel_look.h"
 
 namespace zeropose {
 namespace {
@@ -22,6 +23,10 @@ std::unique_ptr<const Look> look_of(const BallPlateObject& plate, const Scene& s
 
 std::unique_ptr<const Look> look_of(const GapsObject& gaps, const Scene& scene, std::size_t camera) {
   return std::make_unique<GapLook>(gaps, scene, camera);
+}
+
+std::unique_ptr<const Look> look_of(const WheelObject& wheel, const Scene& scene, std::size_t camera) {
+  return std::make_unique<WheelLook>(wheel, scene, camera);
 }
 
 }  // namespace

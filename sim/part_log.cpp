@@ -56,8 +56,9 @@ Pose Parts::drawn() {
 
 Pose Parts::beyond_a_limit(const Pose& X_O0O, std::size_t turn) const {
   constexpr double by = 0.1;  // of the range
-  const std::vector<std::size_t> axes =
-      job_.X_WP_planar ? std::vector<std::size_t>{0, 1, 5} : std::vector<std::size_t>{0, 1, 2, 3, 4, 5};
+  std::vector<std::size_t> axes{0, 1, 2, 3, 4, 5};
+  if (job_.X_WP_planar) axes = {0, 1, 5};
+  if (job_.wheel) axes = {0, 1, 2, 3, 4};
   const std::size_t axis = axes[turn % axes.size()];
   const Range& range = job_.requirements.limits[axis];
   const double room = by * (range.max - range.min);

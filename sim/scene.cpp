@@ -67,6 +67,7 @@ Scene scene_of(const Cell& cell, const Job& job, const std::vector<CalibratedCam
   scene.marks = job.marks;
   scene.object = truth.object;
   if (auto* gaps = std::get_if<GapsObject>(&scene.object)) complete(*gaps, cell, job, scene.cameras);
+  if (auto* wheel = std::get_if<WheelObject>(&scene.object)) complete(*wheel, job, scene.cameras);
   put_on_hands(cell, job, scene);
   for (const View& view : job.views)
     add_view(scene.views, {device_of(job, view.camera, cell.cameras.size()), view.mark});
@@ -93,10 +94,14 @@ std::vector<Scene> load_scenes(const Cell& cell, const std::filesystem::path& si
   std::vector<std::string> mistakes;
   const auto cameras = in_order(cell.cameras, truth.cameras, sim_file.string(), mistakes);
   if (cell.jobs.empty()) mistakes.push_back("the cell has no job, expected one whose marks can be rendered");
-  for (const Job& job : cell.jobs)
+  for (const Job& job : cell.jobs) {
     if (job.gaps && !std::holds_alternative<GapsObject>(truth.object))
       mistakes.push_back(sim_file.string() + ": object: job " + job.name +
                          " has gaps, expected an object of kind gaps");
+    if (job.wheel && !std::holds_alternative<WheelObject>(truth.object))
+      mistakes.push_back(sim_file.string() + ": object: job " + job.name +
+                         " has a wheel, expected an object of kind wheel");
+  }
   if (!mistakes.empty()) throw ConfigError(mistakes);
   std::vector<Scene> scenes;
   for (const Job& job : cell.jobs) scenes.push_back(scene_of(cell, job, cameras, truth));

@@ -14,6 +14,7 @@
 #include "config/cell.h"
 #include "measure/job.h"
 #include "sim/gap_object.h"
+#include "sim/wheel_object.h"
 
 namespace zeropose {
 
@@ -35,7 +36,7 @@ struct BallPlateObject {
   Eigen::Vector2d size_mm = Eigen::Vector2d::Zero();
 };
 
-using ObjectTruth = std::variant<PlatesObject, SheetObject, BallPlateObject, GapsObject>;
+using ObjectTruth = std::variant<PlatesObject, SheetObject, BallPlateObject, GapsObject, WheelObject>;
 
 // Grey levels are those at the middle of the picture, where the illumination is 1.
 struct PictureSettings {

@@ -69,14 +69,32 @@ GapsObject read_gaps_object(JsonObject& object) {
   return gaps;
 }
 
+WheelObject read_wheel_object(JsonObject& object) {
+  WheelObject wheel;
+  std::string type, known;
+  double profile_radius_mm = 0;
+  object.read("profile_radius_mm", profile_radius_mm, NumberRange{0, 1000, true});
+  if (!object.read("tyre", type)) return wheel;
+  for (const TyreShape& tyre : example_tyres()) {
+    known += (known.empty() ? "" : ", ") + tyre.name;
+    if (tyre.name == type) wheel.tyre = tyre;
+  }
+  if (wheel.tyre.name.empty())
+    object.add_mistake("tyre", "\"" + type + "\"", "one of " + known);
+  else
+    wheel.profile_mm = TyreSurface(wheel.tyre).section(profile_radius_mm).z_mm;
+  return wheel;
+}
+
 // The words, and who reads the rest.
 ObjectTruth read_object_truth(JsonObject& object) {
-  constexpr std::array<std::string_view, 4> kinds{"plates", "sheet", "ball_plate", "gaps"};
-  constexpr std::array<ObjectTruth (*)(JsonObject&), 4> readers{
+  constexpr std::array<std::string_view, 5> kinds{"plates", "sheet", "ball_plate", "gaps", "wheel"};
+  constexpr std::array<ObjectTruth (*)(JsonObject&), 5> readers{
       [](JsonObject&) -> ObjectTruth { return PlatesObject{}; },
       [](JsonObject& sheet) -> ObjectTruth { return read_sheet(sheet); },
       [](JsonObject& plate) -> ObjectTruth { return read_ball_plate(plate); },
-      [](JsonObject& gaps) -> ObjectTruth { return read_gaps_object(gaps); }};
+      [](JsonObject& gaps) -> ObjectTruth { return read_gaps_object(gaps); },
+      [](JsonObject& wheel) -> ObjectTruth { return read_wheel_object(wheel); }};
   std::size_t kind = 0;
   return object.read_word("kind", kinds, kind) ? readers[kind](object) : PlatesObject{};
 }

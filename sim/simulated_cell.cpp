@@ -150,7 +150,9 @@ void SimulatedCell::require_mark(const std::string& mark) const {
   };
   const auto knows = [&](const Scene& scene) {
     const auto* gaps = std::get_if<GapsObject>(&scene.object);
-    return has(scene.marks) || has(scene.fixed_marks) || (gaps != nullptr && gap_spot(*gaps, mark));
+    const auto* wheel = std::get_if<WheelObject>(&scene.object);
+    return has(scene.marks) || has(scene.fixed_marks) || (gaps != nullptr && gap_spot(*gaps, mark)) ||
+           (wheel != nullptr && wheel_fault(*wheel, mark));
   };
   if (std::ranges::none_of(scenes_, knows)) throw std::invalid_argument("no mark '" + mark + "' in the cell");
 }
