@@ -13,6 +13,7 @@
 #include "daemon/pose_json.h"
 #include "daemon/proposal_json.h"
 #include "daemon/survey_json.h"
+#include "daemon/wheel_json.h"
 
 namespace zeropose {
 namespace {
@@ -36,13 +37,15 @@ Json verdict(Code code, const std::string& reason) {
 }
 
 Json zero_json(const ZeroRecord& record) {
+  const double radius_mm = record.zero.profile_radius_mm;  // of a wheel
   Json compensation = Json::array();
   for (const auto& shift : record.zero.compensation_O_mm)
     compensation.push_back({shift.x(), shift.y(), shift.z()});
   return {{"id", record.id},
           {"time", record.time_utc},
           {"X_WO0", six_json(record.zero.X_WO0)},
-          {"compensation_mm", compensation}};
+          {"compensation_mm", compensation},
+          {"profile_radius_mm", radius_mm > 0 ? Json(radius_mm) : Json()}};
 }
 
 Json check_json(const CameraCheck& check) {
@@ -165,6 +168,7 @@ Json measure_answer(Cycle& cycle) {
   if (outcome.device_spread) answer["device_spread_us"] = microseconds(*outcome.device_spread);
   answer["marks"] = marks_json(*outcome.job, cycle.cell(), m);
   if (m.gaps) answer["gaps"] = gaps_json(*outcome.job, cycle.cell(), m);
+  if (m.wheel) answer["wheel"] = wheel_json(*m.wheel);
   answer["references"] = references_json(cycle.cell(), cycle.status().zero, m);
   answer["proposal"] = proposal_json(outcome.proposal, cycle.cell());
   answer["cameras"] = Json::array();
@@ -202,6 +206,12 @@ std::string base64(const std::vector<std::uint8_t>& bytes) {
   return text;
 }
 
+std::vector<std::uint8_t> picture_of(const ImageView& image, const Snapshot& snapshot, bool marks) {
+  if (marks && snapshot.lines) return overlay_png(image, *snapshot.lines);
+  if (marks && !snapshot.gaps.empty()) return overlay_png(image, snapshot.gaps);
+  return overlay_png(image, marks ? snapshot.marks : std::vector<MarkOverlay>{});
+}
+
 Json snapshot_answer(Cycle& cycle, const std::string& name, bool marks) {
   const auto& cameras = cycle.cell().cameras;
   const auto camera =
@@ -212,9 +222,7 @@ Json snapshot_answer(Cycle& cycle, const std::string& name, bool marks) {
   Json answer = verdict(code_of(snapshot.grabbed.status), snapshot.grabbed.reason);
   if (snapshot.grabbed.status != GrabStatus::ok) return answer;
   const ImageView image = view_of(snapshot.grabbed.frame);
-  answer["png"] = base64(marks && !snapshot.gaps.empty()
-                             ? overlay_png(image, snapshot.gaps)
-                             : overlay_png(image, marks ? snapshot.marks : std::vector<MarkOverlay>{}));
+  answer["png"] = base64(picture_of(image, snapshot, marks));
   return answer;
 }
 

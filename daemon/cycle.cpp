@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "measure/wheel_job.h"
+
 namespace zeropose {
 namespace {
 
@@ -349,9 +351,11 @@ Snapshot Cycle::snapshot_now(std::size_t camera) {
 Snapshot Cycle::snapshot(std::size_t camera) {
   const Job& job = cell_.jobs[selected_];
   const std::size_t cameras[] = {camera};
-  Snapshot snapshot{std::move(grabber_.grab(cameras, Clock::now() + cell_.deadline).front()), {}, {}};
+  Snapshot snapshot{std::move(grabber_.grab(cameras, Clock::now() + cell_.deadline).front()), {}, {}, {}};
   if (snapshot.grabbed.status != GrabStatus::ok) return snapshot;
   find_gaps(camera, snapshot);
+  if (job.wheel)
+    snapshot.lines = wheel_lines(job, cell_.calibration, camera, view_of(snapshot.grabbed.frame));
   const auto& zero = zeros_[selected_].record;
   const Pose X_WO_expected = zero ? zero->zero.X_WO0 : job.X_WO_nominal;
   const auto calibration = cameras_for(cell_, job);

@@ -50,6 +50,7 @@ struct Snapshot {
   GrabResult grabbed;
   std::vector<MarkOverlay> marks;
   std::vector<GapOverlay> gaps;
+  std::optional<LineArrayResult> lines;  // of a wheel's projector
 };
 
 struct SurveyState {

@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/cycle.h"
+#include "measure/wheel_job.h"
 
 namespace zeropose {
 namespace {
@@ -41,6 +42,7 @@ ZeroOutcome Cycle::take_zero(std::optional<std::uint32_t> part, TimePoint deadli
   const auto rounds =
       job.positions.empty() ? static_cast<std::size_t>(cell_.zero_frames) : hands_.rounds(job);
   std::vector<std::vector<Observation>> observations;
+  std::vector<WheelResult> wheels;
   std::vector<std::vector<MarkFinding>> references;
   for (std::size_t i = 0; i < rounds; ++i) {
     last_progress_ = Clock::now();
@@ -49,11 +51,13 @@ ZeroOutcome Cycle::take_zero(std::optional<std::uint32_t> part, TimePoint deadli
                      std::min(deadline - compute_reserve, Clock::now() + cell_.deadline));
     if (grabbed.code != Code::ok) return {grabbed.code, grabbed.reason, {}, Vector6::Zero()};
     const auto images = images_of(grabbed.eyes, grabbed.frames);
-    const auto findings = find_job_marks(images, job, cameras, job.X_WO_nominal);
-    observations.push_back(observations_of(findings, job));
+    if (job.wheel)
+      wheels.push_back(look_at_wheel(images, job, cameras, {}));
+    else
+      observations.push_back(observations_of(find_job_marks(images, job, cameras, job.X_WO_nominal), job));
     references.push_back(find_references(images, cell_.references, cell_.calibration));
   }
-  ZeroResult result = make_zero(cameras, job, observations);
+  ZeroResult result = job.wheel ? make_wheel_zero(job, wheels) : make_zero(cameras, job, observations);
   if (result.code == Code::ok) {
     ReferenceZero fixed = average_references(cell_.references, cell_.calibration, references);
     result.code = fixed.code;

@@ -12,7 +12,7 @@
 namespace zeropose {
 namespace {
 
-const cv::Scalar blue(235, 160, 60), green(60, 220, 60), red(60, 60, 240);
+const cv::Scalar blue(235, 160, 60), green(60, 220, 60), red(60, 60, 240), orange(40, 140, 255);
 
 // Drawing coordinates are fixed point: 1/16 px.
 constexpr int sub_bits = 4;
@@ -106,6 +106,15 @@ void draw(cv::Mat& picture, const GapOverlay& gap) {
   if (!found) write_lines(picture, gap.found.reason, {8, 38}, red);
 }
 
+// Centre by centre: what lies between was not seen.
+void draw(cv::Mat& picture, const LightLine& line, const cv::Scalar& colour) {
+  for (const LineCentre& centre : line.centres) {
+    const bool upright = line.course == LineCourse::upright;
+    const Eigen::Vector2d at(upright ? centre.place : centre.at, upright ? centre.at : centre.place);
+    cv::circle(picture, fixed(at), 6, colour, cv::FILLED, cv::LINE_AA, sub_bits);
+  }
+}
+
 cv::Mat colour_copy(const ImageView& image) {
   // OpenCV has no read-only view; the pixels are only read.
   cv::Mat grey(image.height_px, image.width_px, image.two_bytes() ? CV_16UC1 : CV_8UC1,
@@ -150,6 +159,21 @@ std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const Ma
 std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const GapOverlay> gaps) {
   cv::Mat picture = colour_copy(image);
   for (const auto& gap : gaps) draw(picture, gap);
+  return png_of(picture);
+}
+
+std::vector<std::uint8_t> overlay_png(const ImageView& image, const LineArrayResult& lines) {
+  cv::Mat picture = colour_copy(image);
+  if (lines.status != LineArrayStatus::ok) {
+    for (const LightLine& line : lines.found) draw(picture, line, red);
+    write_lines(picture, lines.reason, {8, 20}, red);
+    return png_of(picture);
+  }
+  for (const LightLine& line : lines.radial) draw(picture, line, green);
+  for (const LightLine& line : lines.across) draw(picture, line, blue);
+  for (const auto& row : lines.crossings)
+    for (const auto& crossing : row)
+      if (crossing) cv::circle(picture, fixed(*crossing), 4 << sub_bits, orange, 1, cv::LINE_AA, sub_bits);
   return png_of(picture);
 }
 

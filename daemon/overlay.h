@@ -10,6 +10,7 @@
 #include "measure/body.h"
 #include "measure/gap.h"
 #include "measure/image.h"
+#include "measure/line_array.h"
 #include "measure/marks.h"
 
 namespace zeropose {
@@ -33,6 +34,10 @@ struct GapOverlay {
 // PNG bytes: the windows in blue, the edges of frame and pane in green as long as they are seen, with the gap
 // in mm between them; what was not measured in red with its reason.
 std::vector<std::uint8_t> overlay_png(const ImageView& image, std::span<const GapOverlay> gaps);
+
+// PNG bytes: radial lines in green, those across in blue, crossings in orange; the reason in red where they
+// are not in order, with all lines that were found.
+std::vector<std::uint8_t> overlay_png(const ImageView& image, const LineArrayResult& lines);
 
 // PNG bytes: the points of a board in green, each with row.column, joined in their order by blue lines (red
 // from one row to the next), and the reason, if there is one.

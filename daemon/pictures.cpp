@@ -119,10 +119,8 @@ std::vector<Frame> HandPictures::frames(const Job& job, std::size_t back) const 
 
 std::vector<std::size_t> eyes_of(const Cell& cell, const Job& job) {
   std::vector<std::size_t> eyes;
-  for (const View& view : job.views)
-    if (view.camera < cell.cameras.size()) eyes.push_back(view.camera);
-  if (job.gaps)
-    for (const GapView& gap : job.gaps->gaps) eyes.push_back(gap.camera);
+  for (const std::size_t camera : cameras_of(job))
+    if (camera < cell.cameras.size()) eyes.push_back(camera);
   std::ranges::sort(eyes);
   eyes.erase(std::unique(eyes.begin(), eyes.end()), eyes.end());
   for (std::size_t i = 0; i < hand_eyes(job).size(); ++i) eyes.push_back(cell.cameras.size() + i);

@@ -66,8 +66,7 @@ struct JobPictures {
   std::optional<std::chrono::nanoseconds> device_spread;
 };
 
-// The fixed cameras of the job, or those that look at its gaps, then those of its positions, as View::camera
-// counts them.
+// The cameras of the job that need no position, then those of its positions, as View::camera counts them.
 std::vector<std::size_t> eyes_of(const Cell& cell, const Job& job);
 
 // Grabs the fixed cameras and adds the pictures of the hands, `back` rounds ago.

@@ -46,6 +46,8 @@ std::string summary_of(const Cell& cell) {
     text << "  job " << job.number << " " << job.name << ": ";
     if (job.gaps)
       text << job.gaps->gaps.size() << " gaps\n";
+    else if (job.wheel)
+      text << "a wheel, " << job.wheel->sensors.size() << " stereo sensors\n";
     else
       text << job.marks.size() << " marks, " << job.views.size() << " views\n";
   }

@@ -156,6 +156,22 @@ void print_gaps(const Json& answer) {
             << "\n";
 }
 
+// Camber and toe; nothing for another job.
+void print_wheel(const Json& answer) {
+  const Json wheel = answer.value("wheel", Json());
+  if (!wheel.is_object() || !wheel.contains("camber_deg")) return;
+  std::cout << "  camber " << short_text(wheel["camber_deg"]) << " deg, sigma "
+            << short_text(wheel["sigma_camber_deg"]) << "; toe " << short_text(wheel["toe_deg"])
+            << " deg, sigma " << short_text(wheel["sigma_toe_deg"]) << "; profile at a radius of "
+            << short_text(wheel["profile_radius_mm"]) << " mm\n";
+}
+
+// Of what effective_marks counts.
+std::string counted_in(const Json& answer) {
+  if (answer.contains("gaps")) return " gaps";
+  return answer.contains("wheel") ? " profile points" : " marks";
+}
+
 void print_status(const Json& answer) {
   std::cout << "cell " << text_or(answer, "cell") << (answer["simulated"] ? " (simulated)" : "") << ", job "
             << text_or(answer, "job") << ": " << (answer["ready"] ? "ready" : "NOT READY") << '\n';
@@ -181,12 +197,12 @@ void print_measurement(const Json& answer) {
   print_verdict(answer);
   print_proposal(answer);
   print_gaps(answer);
+  print_wheel(answer);
   if (answer.contains("X_O0O"))
     std::cout << "  x y z mm, rx ry rz deg: " << pose_text(answer["X_O0O"]) << "\n  "
-              << answer["effective_marks"] << (answer.contains("gaps") ? " gaps in " : " marks in ")
-              << answer["effective_cameras"] << " cameras, largest deviation "
-              << short_text(answer["largest_deviation_mm"]) << " mm, sigma " << short_text(answer["sigma_mm"])
-              << " mm\n";
+              << answer["effective_marks"] << counted_in(answer) << " in " << answer["effective_cameras"]
+              << " cameras, largest deviation " << short_text(answer["largest_deviation_mm"]) << " mm, sigma "
+              << short_text(answer["sigma_mm"]) << " mm\n";
   for (const auto& mark : answer.value("marks", Json::array()))
     if (mark["finding"] != "found" || mark.value("removed", false))
       std::cout << "  " << text_or(mark, "camera") << ": mark " << text_or(mark, "mark") << ' '

@@ -200,7 +200,9 @@ std::string plan_text(const Cell& cell, const Job& job, const Plan& plan) {
 Answer plan_of(const Options& options) {
   Cell cell = load_cell(options.cell);
   const Job& job = job_of(cell, options.job);
-  if (job.gaps) return failure(concat({"job ", job.name, " evens gaps: it has no marks to plan with"}));
+  if (job.gaps || job.wheel)
+    return failure(concat({"job ", job.name, job.gaps ? " evens gaps" : " measures a wheel",
+                           ": it has no marks to plan with"}));
   cell.calibration = cameras_for(cell, job);
   const Plan result = plan({cell.calibration, job, options.sigma_px, &cell.references});
   return {result.verdict.code == Code::ok ? done : no_answer, plan_json(cell, job, result),

@@ -136,9 +136,9 @@ Answer verify_cell(const Options& options) {
     throw std::invalid_argument("--state or --pose is required: where does the object stand?");
   const Cell cell = load_cell(options.cell);
   const Job& job = job_of(cell, options.job);
-  if (job.gaps)
-    return failure(
-        concat({"job ", job.name, " evens gaps: it has no zero and no points in the world to verify"}));
+  if (job.gaps || job.wheel)
+    return failure(concat({"job ", job.name, job.gaps ? " evens gaps" : " measures a wheel",
+                           ": it has no points of an object to verify"}));
   std::optional<ZeroRecord> zero;
   if (!options.state.empty()) {
     StoredZero stored = load_zero_for(options.state, cell, job);
