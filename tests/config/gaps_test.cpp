@@ -49,7 +49,7 @@ TEST_F(Gaps, AreReadWithTheirUnits) {
 TEST_F(Gaps, StandInPlaceOfMarks) {
   job()["marks"] = Json::array();
   EXPECT_THAT(mistakes(),
-              ElementsAre(HasSubstr("jobs[0].marks: found a key of jobs with marks beside gaps")));
+              ElementsAre(HasSubstr("jobs[0].marks: found a key of another kind of job beside gaps")));
   Json other = example();
   other["jobs"][0].erase("marks");
   EXPECT_THAT(mistakes_in(other),

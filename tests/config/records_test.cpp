@@ -51,6 +51,7 @@ void expect_same(const ZeroRecord& a, const ZeroRecord& b) {
     EXPECT_TRUE(r.u_px == s.u_px);
     EXPECT_TRUE(r.covariance_px2 == s.covariance_px2);
   }
+  EXPECT_EQ(a.zero.profile_radius_mm, b.zero.profile_radius_mm);
   EXPECT_TRUE(a.spread == b.spread);
   EXPECT_EQ(a.time_utc, b.time_utc);
   EXPECT_EQ(a.frames, b.frames);
@@ -79,6 +80,36 @@ TEST(Records, ComeBackBitForBit) {
     EXPECT_NE(id, 0U);
     EXPECT_EQ(id, short_hash(text_of_file(zero_path(directory.path(), "body"))));
   }
+}
+
+// A wheel's has no marks, but the profile that was chosen.
+TEST(Records, OfAWheelComeBackBitForBit) {
+  const TemporaryFolder directory;
+  ZeroRecord record = example(4);
+  record.zero.compensation_O_mm.clear();
+  record.zero.profile_radius_mm = 705.6 / 3;
+  save_zero(directory.path(), record);
+  const auto loaded = load_zero(directory.path(), "body");
+  ASSERT_TRUE(loaded);
+  expect_same(*loaded, record);
+}
+
+TEST(Records, OfMarksIsOutdatedForAWheel) {
+  const TemporaryFolder directory;
+  Cell cell;
+  Job job;
+  job.name = "body";
+  job.wheel.emplace();
+  ZeroRecord record = example(5);
+  record.zero.compensation_O_mm.clear();
+  record.config_hash = cell.config_hash, record.calibration_hash = cell.calibration_hash;
+  save_zero(directory.path(), record);
+  const StoredZero without = load_zero_for(directory.path(), cell, job);
+  EXPECT_EQ(without.code, Code::zero_outdated);
+  EXPECT_THAT(without.reason, HasSubstr("no profile of a tyre"));
+  record.zero.profile_radius_mm = 235;
+  save_zero(directory.path(), record);
+  EXPECT_EQ(load_zero_for(directory.path(), cell, job).code, Code::ok);
 }
 
 TEST(Records, ExtremeNumbersComeBack) {

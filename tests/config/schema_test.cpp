@@ -40,7 +40,7 @@ void walk(const Json& object, const std::string& path, const std::string& pointe
   }
 }
 
-// A job of the other kind, with every key.
+// Jobs of the other kinds, with every key.
 Json gap_job() {
   Json job = parsed(R"({"name": "gaps", "number": 7, "gaps": {"pane_in_hand": [-1200, 2000, 200, 0, 0, 0],
     "even": true, "min_gaps": 4, "shape_sigma_mm": 0.1, "tolerance_mm": 0.05, "max_sigma_mm": 0.05,
@@ -55,6 +55,27 @@ Json gap_job() {
     job["gaps"]["places"].push_back(place);
   }
   return job;
+}
+
+Json wheel_cell(const char* ending) {
+  return parsed(read_file(std::string(ZEROPOSE_SOURCE_DIR) + "/config/cells/wheel-alignment" + ending));
+}
+
+// Its cameras come with it.
+void add_wheel_job(Json& json) {
+  const Json cell = wheel_cell(".json");
+  for (Json camera : cell["cameras"]) {
+    camera["name"] = "wheel " + camera["name"].get<std::string>();
+    json["cameras"].push_back(camera);
+  }
+  Json job = cell["jobs"][0];
+  job["number"] = 8;
+  for (Json& sensor : job["wheel"]["sensors"])
+    for (const char* side : {"left", "right"}) sensor[side] = "wheel " + sensor[side].get<std::string>();
+  job["wheel"]["lines"].update(
+      parsed(R"({"sigma_px": 1.7, "min_contrast": 10, "min_length_px": 10, "max_join_px": 45})"));
+  job["wheel"].update(parsed(R"({"unevenness_mm": 0.15, "out_of_round_mm": 0.3, "max_sigma_deg": 0.02})"));
+  json["jobs"].push_back(job);
 }
 
 // The example with every optional key present.
@@ -87,6 +108,7 @@ Json full_example() {
   json["jobs"][0]["requirements"]["max_step_mm"] = 30;
   json["jobs"][0]["requirements"]["max_step_deg"] = 0.25;
   json["jobs"].push_back(gap_job());
+  add_wheel_job(json);
   json["robots"][0]["axis"] = {{"direction", {1, 0, 0}}, {"zero_mm", 0}};
   json["reference_points"] =
       Json::array({parsed(R"({"name": "r", "cameras": ["camera1"], "kind": "bright_ring", "radius_mm": 5,
@@ -115,12 +137,15 @@ Json full_example() {
   return json;
 }
 
-// With the calibration of its camera on a hand.
+// With the calibration of its camera on a hand, and of those that look at a wheel.
 std::vector<std::string> mistakes_of(const Json& full) {
   Json calibration = example_calibration();
   calibration["hand"] = calibration["camera1"];
   calibration["hand"]["X_HC"] = calibration["hand"]["X_WC"];
   calibration["hand"].erase("X_WC");
+  const Json wheel = wheel_cell(".calibration.json");
+  for (const auto& [name, camera] : wheel.items())
+    calibration["wheel " + name] = camera;
   return mistakes_in(full.dump(), calibration.dump());
 }
 
@@ -160,7 +185,7 @@ TEST(Schema, RequiresWhatTheLoaderRequires) {
   ASSERT_THAT(mistakes_of(full), IsEmpty());
   walk(schema(), "", "",
        [&](const std::string& path, const std::string& pointer, const Json&, bool required) {
-         if (path == "jobs[].gaps") return;  // without them it is a job that looks at marks
+         if (path == "jobs[].gaps" || path == "jobs[].wheel") return;  // without it is a job with marks
          const Json::json_pointer place = place_of_key(full, pointer);
          ASSERT_TRUE(full.contains(place)) << path;
          Json without = full;

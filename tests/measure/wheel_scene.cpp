@@ -16,8 +16,6 @@ using Eigen::Vector3d;
 
 constexpr double pi = std::numbers::pi;
 constexpr double before_mm = 500, foot_mm = 265, half_base_mm = 120;
-constexpr double line_apart_rad = 8 * pi / 180, line_sigma_mm = 0.5;
-constexpr double line_end_mm = 58, across_end_mm = 18;  // to the right: of the control line, of the others
 
 Vector3d outwards_at(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad), 0}; }
 Vector3d right_at(double angle_rad) { return {std::sin(angle_rad), -std::cos(angle_rad), 0}; }
@@ -36,41 +34,6 @@ Pose looking(const Vector3d& from, double angle_rad) {
 
 Vector3d station(double angle_rad, double right_mm) {
   return foot_mm * outwards_at(angle_rad) + right_mm * right_at(angle_rad) + before_mm * Vector3d::UnitZ();
-}
-
-// Through the projector and the wheel's axis where that meets the plane z = 0, at an angle beside the middle.
-ProjectedLine radial_line(const TyreShape& tyre, const Pose& X_WP, double angle_rad) {
-  const Vector3d along_W = outwards_at(angle_rad), to_axis_W = -X_WP.translation();
-  ProjectedLine line;
-  line.n_P = X_WP.linear().transpose() * to_axis_W.cross(along_W).normalized();
-  line.along_P = Vector3d::UnitY();
-  line.from = (foot_mm - (tyre.tread_mm + 6)) / before_mm;
-  line.to = (foot_mm - (tyre.bead_mm - 6)) / before_mm;
-  return line;
-}
-
-ProjectedLine across_line(double radius_mm, double end_mm) {
-  const double slope = (foot_mm - radius_mm) / before_mm;
-  return {Vector3d(0, 1, -slope).normalized(), Vector3d::UnitX(), -line_end_mm / before_mm,
-          end_mm / before_mm};
-}
-
-// Beside ridges and grooves, from outside.
-std::vector<double> across_radii_mm(const TyreShape& tyre) {
-  if (tyre.bead_mm < 200) return {250, 235, 215.5};
-  if (tyre.bead_mm < 240) return {276, 262, 248};
-  return {300, 286, 274};
-}
-
-LineProjector projector(const TyreShape& tyre, double angle_rad, const LineLayout& layout) {
-  LineProjector projector{looking(station(angle_rad, 0), angle_rad), {}, line_sigma_mm / before_mm};
-  for (const double side : {1, 0, -1})  // the right one at the smallest angle
-    projector.lines.push_back(radial_line(tyre, projector.X_WP, angle_rad + side * line_apart_rad));
-  for (const double radius_mm : across_radii_mm(tyre)) {
-    const bool control = projector.lines.size() == first_across + layout.control;
-    projector.lines.push_back(across_line(radius_mm, control ? line_end_mm : across_end_mm));
-  }
-  return projector;
 }
 
 double normal(std::mt19937_64& random, double sigma) {
@@ -135,7 +98,7 @@ WheelCell wheel_cell(const TyreShape& tyre) {
   for (std::size_t s = 0; s < wheel_sensors; ++s) {
     const double angle = pi / 2 + 2 * pi / 3 * static_cast<double>(s);
     cell.angles_rad[s] = angle;
-    cell.projectors[s] = projector(tyre, angle, cell.layout);
+    cell.projectors[s] = wheel_projector(tyre, looking(station(angle, 0), angle), angle, cell.layout);
     for (std::size_t side = 0; side < 2; ++side) {
       const std::size_t c = 2 * s + side;
       const auto n = static_cast<double>(c);

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "measure/wheel.h"
-#include "sim/tyre_look.h"
+#include "sim/wheel_object.h"
 
 namespace zeropose::test {
 
