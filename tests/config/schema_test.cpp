@@ -144,8 +144,7 @@ std::vector<std::string> mistakes_of(const Json& full) {
   calibration["hand"]["X_HC"] = calibration["hand"]["X_WC"];
   calibration["hand"].erase("X_WC");
   const Json wheel = wheel_cell(".calibration.json");
-  for (const auto& [name, camera] : wheel.items())
-    calibration["wheel " + name] = camera;
+  for (const auto& [name, camera] : wheel.items()) calibration["wheel " + name] = camera;
   return mistakes_in(full.dump(), calibration.dump());
 }
 
