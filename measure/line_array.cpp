@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "calib/words.h"
 
@@ -61,16 +62,36 @@ struct Found {
   }
 };
 
-// What crosses nothing goes; the rest stands in the order in which the lines cross the image's middle of the
-// other kind.
+// Lines that hang together by crossings are a group; of each line (the radial ones first) how many crossings
+// its group has.
+std::vector<std::size_t> crossings_of_groups(const Found& found) {
+  const std::size_t radial = found.radial.size();
+  std::vector<std::size_t> group(radial + found.across.size());
+  std::iota(group.begin(), group.end(), std::size_t{0});
+  std::vector<std::size_t> crossings(group.size());
+  for (std::size_t a = 0; a < found.across.size(); ++a)
+    for (std::size_t r = 0; r < radial; ++r)
+      if (found.crossings[a][r]) {
+        const std::size_t one = group[r], other = group[radial + a];
+        std::ranges::replace(group, one, other);
+      }
+  for (std::size_t a = 0; a < found.across.size(); ++a) crossings[group[radial + a]] += found.of_across(a);
+  for (std::size_t& of_line : group) of_line = crossings[of_line];
+  return group;
+}
+
+// The group with the most crossings stays, of equals all; what crosses nothing goes. The lines stand in the
+// order in which they cross the image's middle of the other kind.
 Found sorted(std::vector<LightLine> radial, std::vector<LightLine> across, const LineArrayProblem& problem) {
   Found found{std::move(radial), std::move(across), {}};
   found.cross();
+  const std::vector<std::size_t> crossings = crossings_of_groups(found);
+  const std::size_t most = crossings.empty() ? 0 : std::max(std::size_t{1}, std::ranges::max(crossings));
   Found kept;
   for (std::size_t i = 0; i < found.radial.size(); ++i)
-    if (found.of_radial(i) > 0) kept.radial.push_back(found.radial[i]);
+    if (crossings[i] == most) kept.radial.push_back(found.radial[i]);
   for (std::size_t i = 0; i < found.across.size(); ++i)
-    if (found.of_across(i) > 0) kept.across.push_back(found.across[i]);
+    if (crossings[found.radial.size() + i] == most) kept.across.push_back(found.across[i]);
   const auto middle = [](const LightLine& line) { return line.centres[line.centres.size() / 2].place; };
   const double right = problem.right_px.x(), outwards = problem.outwards_px.y();
   std::ranges::sort(kept.radial, {}, [&](const LightLine& line) { return right * middle(line); });

@@ -62,6 +62,14 @@ TEST_F(WheelAlignmentLine, TheCommandLineShowsTheAnglesOrWhatIsMissing) {
   EXPECT_EQ(zeropose({"snapshot", "--camera", "camera3", "--out", picture.string()}).status, 0);
   EXPECT_GT(std::filesystem::file_size(picture), 10000u);
 
+  // A camera that was knocked.
+  ask_cell({{"cmd", "fault"}, {"kind", "clear"}});
+  ask_cell(
+      {{"cmd", "fault"}, {"kind", "camera-moved"}, {"camera", "camera5"}, {"pose", {0.5, 0, 0, 0, 0, 0}}});
+  const Json moved = measure();
+  EXPECT_EQ(moved["code"], 601) << moved;
+  EXPECT_THAT(moved["reason"].get<std::string>(), HasSubstr("camera5"));
+
   const std::string cell = file_of("wheel-alignment");
   EXPECT_THAT(run_program({bin("zeropose"), "plan", "--cell", cell}).err,
               HasSubstr("job 205/55 R16 measures a wheel: it has no marks to plan with"));

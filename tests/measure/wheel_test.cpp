@@ -133,6 +133,33 @@ TEST_F(Wheel, LinesTooManyAreAmbiguous) {
   expect_refused(with_fault(controls, 1), LineArrayStatus::order_ambiguous, "2 lines cross all three");
 }
 
+// A bright line between two pixels, as wide as the projector's.
+void draw_line(std::vector<float>& picture, const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+  constexpr double sigma_px = 1.7, grey = 60;
+  const Eigen::Vector2d along = (to - from).normalized(), across(-along.y(), along.x());
+  for (int v = 0; v < 572; ++v)
+    for (int u = 0; u < 768; ++u) {
+      const Eigen::Vector2d off = Eigen::Vector2d(u, v) - from;
+      if (off.dot(along) < 0 || off.dot(along) > (to - from).norm()) continue;
+      const double beside = off.dot(across) / sigma_px;
+      picture[static_cast<std::size_t>(v) * 768 + static_cast<std::size_t>(u)] +=
+          static_cast<float>(grey * std::exp(-beside * beside / 2));
+    }
+}
+
+// Edges of what stands beyond the tyre cross each other too. Only another whole array is ambiguous.
+TEST_F(Wheel, LinesBeyondTheTyreAreLeftOut) {
+  CleanPictures pictures = clean();
+  std::vector<float>& picture = pictures[2];
+  for (const double v : {30.0, 80.0}) draw_line(picture, {20, v}, {140, v});
+  for (const double u : {40.0, 80.0}) draw_line(picture, {u, 10}, {u, 100});
+  expect_true(measured(cell(), exposed(pictures, noise_)));
+  draw_line(picture, {20, 55}, {160, 55});
+  draw_line(picture, {150, 10}, {150, 100});
+  expect_refused(measured(cell(), exposed(pictures, noise_)), LineArrayStatus::order_ambiguous,
+                 "one is too many");
+}
+
 TEST_F(Wheel, WrongOrderIsNamed) {
   WheelCell mirrored = cell();  // the others stop before the left line instead
   for (const std::size_t line : {first_across, first_across + 2}) {
