@@ -40,6 +40,7 @@ TimePoint oldest_of(const std::vector<Frame>& frames) {
 
 Standing standing_of(const Cell& cell, const Job& job, const Request& request) {
   if (job.positions.empty()) return {Code::no_procedure, "job " + job.name + " has no positions", 0};
+  if (request.job == 0) return {Code::no_procedure, "no survey runs, whose positions have no job", 0};
   if (request.job != job.number)
     return {Code::unknown_job, fmt::format("job {} is named, {} is selected", request.job, job.number), 0};
   const auto count = static_cast<std::int32_t>(job.positions.size());

@@ -22,8 +22,8 @@ struct Standing {
   std::size_t position = 0;  // index into the job's, when ok
 };
 
-// Codes: no_procedure (the job has no positions), unknown_job, argument_out_of_range (the index),
-// wrong_position (another robot's, or the hand is not where it was taught).
+// Codes: no_procedure (the job has no positions, or none is named), unknown_job, argument_out_of_range (the
+// index), wrong_position (another robot's, or the hand is not where it was taught).
 Standing standing_of(const Cell& cell, const Job& job, const Request& at_position);
 
 // What the cameras on hands saw of one part. Not thread-safe.

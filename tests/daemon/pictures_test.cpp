@@ -144,6 +144,8 @@ TEST_F(Standings, ElsewhereIsRefusedWithTheNumbers) {
 TEST_F(Standings, OtherJobsIndicesAndCells) {
   request.job = 2;
   EXPECT_EQ(standing().code, Code::unknown_job);
+  request.job = 0;  // as in a survey
+  EXPECT_EQ(standing().code, Code::no_procedure);
   request.job = 1;
   for (const std::int32_t index : {0, -1, 9}) {
     request.argument = index;
