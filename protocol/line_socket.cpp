@@ -1,5 +1,6 @@
 #include "protocol/line_socket.h"
 
+#include <fcntl.h>
 #include <poll.h>
 #include <sys/eventfd.h>
 #include <sys/socket.h>
@@ -8,6 +9,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <optional>
 #include <stdexcept>
@@ -93,11 +95,25 @@ LineServer::LineServer(std::filesystem::path socket, Answer answer)
   listener_ = Descriptor(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   stop_ = Descriptor(::eventfd(0, EFD_CLOEXEC));
   if (!listener_ || !stop_) fail(socket_, "cannot create the socket");
-  if (::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    fail(socket_, "cannot bind");
-  ::chmod(socket_.c_str(), 0660);
-  if (::listen(listener_.get(), 8) != 0) fail(socket_, "cannot listen");
+  listen_there();
   thread_ = std::thread([this] { serve(); });
+}
+
+// Whoever finds the socket can connect: it gets its name when it listens, and nobody else's.
+void LineServer::listen_there() {
+  const std::filesystem::path unnamed = socket_.parent_path() / (std::to_string(::getpid()) + ".new");
+  const sockaddr_un address = address_of(unnamed);
+  ::unlink(unnamed.c_str());
+  if (::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
+    fail(unnamed, "cannot bind");
+  ::chmod(unnamed.c_str(), 0660);
+  if (::listen(listener_.get(), 8) == 0 &&
+      ::renameat2(AT_FDCWD, unnamed.c_str(), AT_FDCWD, socket_.c_str(), RENAME_NOREPLACE) == 0)
+    return;
+  const int error = errno;
+  ::unlink(unnamed.c_str());
+  errno = error;
+  fail(socket_, "cannot serve this socket");
 }
 
 LineServer::~LineServer() {

@@ -43,6 +43,7 @@ class LineServer {
   LineServer& operator=(const LineServer&) = delete;
 
  private:
+  void listen_there();
   void serve();
   void serve_client(int client);
 

@@ -140,6 +140,27 @@ TEST_F(LineSocket, SocketThatIsServedIsNotTaken) {
   EXPECT_EQ(ask(socket_.path(), "mine", 10s), "<mine>");
 }
 
+// A script waits for the socket's file and asks.
+TEST(LineServer, WhoeverFindsItCanAsk) {
+  for (int start = 0; start < 200; ++start) {
+    const TemporarySocket socket;
+    std::string answer;
+    std::thread script([&] {
+      while (!std::filesystem::exists(socket.path())) continue;
+      try {
+        answer = ask(socket.path(), "now", 10s);
+      } catch (const std::runtime_error& error) {
+        answer = error.what();
+      }
+    });
+    const LineServer server(socket.path(), [](const std::string& line) { return line; });
+    script.join();
+    ASSERT_EQ(answer, "now") << "start " << start;
+    for (const auto& entry : std::filesystem::directory_iterator(socket.path().parent_path()))
+      EXPECT_EQ(entry.path().filename(), socket.path().filename());
+  }
+}
+
 TEST(LineServer, TakesOverWhatADeadOneLeft) {
   const TemporarySocket socket;
   std::filesystem::create_directories(socket.path().parent_path());
