@@ -93,7 +93,7 @@ Cycle::Told Cycle::look_for_survey(const Request& request) {
   for (const SurveyCamera& camera : survey_.survey->options().cameras) cameras.push_back(camera.index);
   std::array<std::vector<Frame>, 2> frames;
   std::array<std::vector<ImageView>, 2> images;
-  for (std::size_t picture = 0; picture < frames.size(); ++picture) {
+  for (std::size_t picture = 0; picture < frames.size() && !cameras.empty(); ++picture) {
     FrameSet grabbed = grab_for(request, cameras);
     if (grabbed.code != Code::ok) return {grabbed.code, std::move(grabbed.reason)};
     frames[picture] = std::move(grabbed.frames);

@@ -66,6 +66,8 @@ Seen seen(const BodyTarget& target, const ImageView& image) {
   return seen;
 }
 
+Seen seen(const TouchTarget&, const ImageView&) { return {}; }  // it has no cameras
+
 // How far the target wandered, by the points that both pictures show.
 std::string movement(const Seen& first, const Seen& second) {
   double squares = 0, variance = 0;
@@ -88,7 +90,12 @@ std::string movement(const Seen& first, const Seen& second) {
 }  // namespace
 
 Survey::Survey(const SurveyOptions& options) : options_(options) {
-  if (options.cameras.empty()) throw std::invalid_argument("cameras: found none, expected one or more");
+  const bool touches = std::holds_alternative<TouchTarget>(options.target);
+  if (options.cameras.empty() && !touches)
+    throw std::invalid_argument("cameras: found none, expected one or more");
+  if (!options.cameras.empty() && touches)
+    throw std::invalid_argument("cameras: found " + options.cameras.front().name +
+                                ", expected none: nothing looks at touches");
   for (std::size_t i = 1; i < options.cameras.size(); ++i)
     if (std::ranges::find(options.cameras.begin(), options.cameras.begin() + std::ptrdiff_t(i),
                           options.cameras[i].index,

@@ -36,14 +36,17 @@ struct BodyTarget {
   BodyProblem problem;
 };
 
+// A tool's end that touches a fixed tip: where the hand is says all, no camera looks.
+struct TouchTarget {};
+
 struct SurveyCamera {
   std::size_t index = 0;  // of the cell
   std::string name;
 };
 
 struct SurveyOptions {
-  std::vector<SurveyCamera> cameras;  // all must see the target; a body is for one
-  std::variant<RoundTarget, BoardTarget, BodyTarget> target;
+  std::vector<SurveyCamera> cameras;  // all must see the target; a body is for one, a touch for none
+  std::variant<RoundTarget, BoardTarget, BodyTarget, TouchTarget> target;
   int positions = 0;  // the robot counts them from 1
   // Where the hand shall go, X_RH of each position; empty: the robot's own program knows.
   std::vector<Pose> targets{};
@@ -78,8 +81,9 @@ class Survey {
   const SurveyOptions& options() const { return options_; }
 
   // Two pictures of every camera at one position, taken one after the other, so that a robot that still moves
-  // shows. A position that is told again takes the place of what was there. Codes: argument_out_of_range,
-  // too_few_marks (the target is not in sight, or more than one), not_standing_still.
+  // shows; of touches none. A position that is told again takes the place of what was there.
+  // Codes: argument_out_of_range, too_few_marks (the target is not in sight, or more than one),
+  // not_standing_still.
   SurveyVerdict look(int position, const Pose& X_RH, std::span<const ImageView> first,
                      std::span<const ImageView> second);
 

@@ -34,8 +34,9 @@ BoardTarget board_target(const std::string& kind, const Json& target) {
   const auto kinds = {BoardKind::circles, BoardKind::asymmetric_circles, BoardKind::chessboard};
   const auto found = std::ranges::find_if(kinds, [&](BoardKind one) { return kind == name_of(one); });
   if (found == kinds.end())
-    throw std::invalid_argument("no target \"" + kind +
-                                "\"; there are ball, disc, body, circles, asymmetric-circles, chessboard");
+    throw std::invalid_argument(
+        "no target \"" + kind +
+        "\"; there are ball, disc, body, touch, circles, asymmetric-circles, chessboard");
   problem.kind = *found;
   problem.rows = target.at("rows").get<int>();
   problem.cols = target.at("cols").get<int>();
@@ -104,11 +105,13 @@ SurveyOptions survey_options(const Cell& cell, const Json& question) {
   SurveyOptions options;
   for (const auto& name : question.at("cameras").get<std::vector<std::string>>())
     options.cameras.push_back({camera_index(cell, name), name});
-  if (options.cameras.empty()) throw std::invalid_argument("no camera is named");
   options.positions = question.at("positions").get<int>();
   const Json& target = question.at("target");
   const auto kind = target.at("kind").get<std::string>();
-  if (kind == "ball")
+  if (options.cameras.empty() && kind != "touch") throw std::invalid_argument("no camera is named");
+  if (kind == "touch")
+    options.target = TouchTarget{};
+  else if (kind == "ball")
     options.target = round_target(MarkKind::ball, target);
   else if (kind == "disc")
     options.target = round_target(MarkKind::disc, target);

@@ -8,6 +8,7 @@
 #include "config/cameras.h"
 #include "config/files.h"
 #include "config/json_reader.h"
+#include "sim/random.h"
 
 namespace zeropose {
 namespace {
@@ -179,13 +180,40 @@ ShownBody read_body(JsonObject& object, const std::filesystem::path& folder) {
   return body;
 }
 
+// Whoever jogs the robot turns the hand as he likes and moves it until the end touches the tip, about.
+TouchedTip read_touches(JsonObject& object, SurveyDrive& survey) {
+  TouchedTip tip;
+  object.read("end_in_hand_mm", tip.p_HT_mm, 1e4);
+  object.read("touched_mm", tip.p_R_mm, 1e5);
+  object.read("miss_mm", tip.miss_mm, NumberRange{0, 100});
+  std::vector<Eigen::Vector3d> turns_deg;
+  object.read("turns_deg", turns_deg, 360);
+  Random random(1);
+  for (const Eigen::Vector3d& r_deg : turns_deg) {
+    Pose X_RH = from_six_numbers({0, 0, 0, r_deg.x(), r_deg.y(), r_deg.z()});
+    const Eigen::Vector3d miss_mm(random.normal(), random.normal(), random.normal());
+    X_RH.translation() = tip.p_R_mm + tip.miss_mm * miss_mm - X_RH.linear() * tip.p_HT_mm;
+    survey.places.push_back(X_RH);
+  }
+  if (turns_deg.size() < 3)
+    object.add_mistake("turns_deg", std::to_string(turns_deg.size()) + " turns",
+                       "[rx, ry, rz] of the hand at each touch, three and more");
+  return tip;
+}
+
 SurveyDrive read_survey(JsonObject& object, const std::filesystem::path& folder) {
   SurveyDrive survey;
-  object.read("camera", survey.camera);
+  const bool touches = object.has("touched_mm");
+  if (!touches) object.read("camera", survey.camera);
   survey.name = survey.camera;
-  object.read_optional("name", survey.name);
+  if (touches)
+    object.read("name", survey.name);
+  else
+    object.read_optional("name", survey.name);
   StandingObject standing;
-  if (object.has("board") || object.has("body"))
+  if (touches)
+    survey.target = read_touches(object, survey);
+  else if (object.has("board") || object.has("body"))
     survey.target = read_body(object, folder);
   else if (object.has("ball_in_world_mm"))
     survey.target = read_standing_ball(object);
@@ -193,7 +221,7 @@ SurveyDrive read_survey(JsonObject& object, const std::filesystem::path& folder)
     survey.target = standing;
   else
     survey.target = read_ball(object, survey);
-  if (!std::holds_alternative<BallInHand>(survey.target)) read_hand_poses(object, survey);
+  if (!touches && !std::holds_alternative<BallInHand>(survey.target)) read_hand_poses(object, survey);
   object.read_optional("robot", [&](JsonObject& robot) { survey.errors = read_errors(robot); });
   return survey;
 }

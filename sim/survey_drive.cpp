@@ -76,6 +76,7 @@ class Surveyor {
   void show(const StandingObject& object, const Pose&) {
     surveyed_.show_object(job_named(cell_, object.job));
   }
+  void show(const TouchedTip&, const Pose&) {}
   template <typename Target>
   void show(const Target& target, const Pose& X_WH) {
     surveyed_.show(carried_by(target, X_WH));

@@ -41,12 +41,19 @@ struct ShownBody {
   Pose X_WB = Pose::Identity();
 };
 
+// A tool's end that touches a tip which stands still; no camera looks.
+struct TouchedTip {
+  Eigen::Vector3d p_HT_mm = Eigen::Vector3d::Zero();  // the end
+  Eigen::Vector3d p_R_mm = Eigen::Vector3d::Zero();   // the tip
+  double miss_mm = 0;                                 // of each touch and axis, one sigma
+};
+
 // From the truth file of a cell.
 struct SurveyDrive {
   std::string name;       // that of the camera, where it has no other
-  std::string camera;     // that it is for
+  std::string camera;     // that it is for; none: it has a name
   std::size_t robot = 0;  // of the cell
-  std::variant<BallInHand, BallInWorld, ShownBody, StandingObject> target;
+  std::variant<BallInHand, BallInWorld, ShownBody, StandingObject, TouchedTip> target;
   std::vector<Pose> places;  // X_RH of the robot's own program
   RobotErrors errors;
 };

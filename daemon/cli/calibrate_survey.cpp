@@ -40,7 +40,9 @@ is lost: what was gathered when the time is up, or at Ctrl-C, is written too.
                      circles lets the calibrations correct that the centre of an image is not the image of a centre
   --target body      a calibration body, --body table.csv (zeropose find-body --help): hand-eye without a laser tracker,
                      and from one position with control marks its points for calibrate points
-Writes --robot (view, x_mm .. rz_deg: X_RH) and --points (view, u_px, v_px, covariance; of boards and bodies also x_mm
+  --target touch     a tool's end that touches one fixed tip from several orientations, without --camera and --points:
+                     --robot alone is written. Then: zeropose calibrate tool
+Writes --robot (view, x_mm .. rz_deg: X_RH; of touches touch instead of view) and --points (view, u_px, v_px, covariance; of boards and bodies also x_mm
 y_mm z_mm, and with a radius radius_mm nx ny nz). With both cameras of a stereo sensor, --camera left,right, each
 position needs the target in both; --points then has the camera, and of balls and discs the name of the point: "ball",
 or "mark" and the position, or what --marks says (one name per position; the same name again is the same mark).
@@ -92,6 +94,7 @@ Json target_of(const Options& options) {
             {"bright", options.bright},
             {"min_diameter_px", options.min_diameter_px},
             {"max_diameter_px", options.max_diameter_px}};
+  if (options.target == "touch") return {{"kind", "touch"}};
   if (options.target == "body") return {{"kind", "body"}, {"marks", marks_of(options)}};
   return {{"kind", options.target},
           {"rows", options.rows},
@@ -113,6 +116,14 @@ void tell_progress(const Json& now, std::size_t& told, std::string& problem) {
 
 // What cannot succeed is refused before a robot starts.
 void refuse_contradictions(const Options& options) {
+  if (options.target == "touch") {
+    if (!options.cameras.empty() || !options.points.empty())
+      throw std::invalid_argument(
+          "--target touch: expected neither --camera nor --points, nothing is looked at");
+    return;
+  }
+  if (options.cameras.empty()) throw std::invalid_argument("--camera is required");
+  if (options.points.empty()) throw std::invalid_argument("--points is required");
   if (options.robot == options.points)
     throw std::invalid_argument("--robot and --points: expected two files");
   if (options.cameras.size() > 1 && options.target == "body")
@@ -213,9 +224,9 @@ Json gathered(const Options& options, std::uint64_t survey) {
   }
 }
 
-std::string robot_table(const Json& views) {
+std::string robot_table(const Json& views, const std::string& name) {
   std::ostringstream text;
-  text << "view,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n" << std::setprecision(12);
+  text << name << ",x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg\n" << std::setprecision(12);
   for (const Json& view : views) {
     text << view["position"];
     for (const Json& number : view["X_RH"]) text << ',' << number.get<double>();
@@ -259,7 +270,9 @@ std::string points_table(const Json& views, const Options& options) {
 
 Answer survey(const Options& options) {
   refuse_contradictions(options);
-  for (const std::string& path : {options.robot, options.points}) refuse_existing(path, options.replace);
+  const bool touches = options.target == "touch";
+  for (const std::string& path : {options.robot, options.points})
+    if (!path.empty()) refuse_existing(path, options.replace);
   const std::vector<Pose> targets = targets_of(options);
   const std::size_t positions =
       targets.empty() ? static_cast<std::size_t>(options.positions) : targets.size();
@@ -277,8 +290,8 @@ Answer survey(const Options& options) {
   std::cerr << (targets.empty() ? "waiting for the robot to tell " : "the robot is told to go to ")
             << positions << " positions\n";
   const Json all = gathered(options, running.number());
-  replace_file(options.robot, robot_table(all["views"]));
-  replace_file(options.points, points_table(all["views"], options));
+  replace_file(options.robot, robot_table(all["views"], touches ? "touch" : "view"));
+  if (!touches) replace_file(options.points, points_table(all["views"], options));
   std::string missing;
   for (const Json& position : all["missing"])
     missing += concat({missing.empty() ? "" : ", ", position.dump()});
@@ -293,8 +306,9 @@ Answer survey(const Options& options) {
                  {"robot", options.robot},
                  {"points", options.points}};
   answer.exit_status = missing.empty() ? done : no_answer;
-  answer.text = concat({std::to_string(all["views"].size()), " positions are in ", options.robot, " and ",
-                        options.points, missing.empty() ? "" : "; missing are " + missing, "\n"});
+  answer.text = concat({std::to_string(all["views"].size()), " positions are in ", options.robot,
+                        touches ? "" : " and ", options.points,
+                        missing.empty() ? "" : "; missing are " + missing, "\n"});
   return answer;
 }
 
@@ -307,8 +321,7 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   verb.add_option("--socket", options->socket, "the daemon's Unix socket").shows_default();
   verb.add_option("--camera", options->cameras,
                   "name of the camera in the cell; of a stereo sensor left,right")
-      .delimiter(',')
-      .required();
+      .delimiter(',');
   verb.add_option("--marks", options->marks, "names of the discs that a stereo sensor sees, one per position")
       .delimiter(',');
   verb.add_option("--positions", options->positions,
@@ -322,7 +335,7 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   verb.add_flag("--along-hand", options->along_hand, "the steps run along the axes of the hand");
   verb.add_option("--target", options->target, "what is looked for")
       .shows_default()
-      .one_of({"ball", "disc", "body", "circles", "asymmetric-circles", "chessboard"});
+      .one_of({"ball", "disc", "body", "touch", "circles", "asymmetric-circles", "chessboard"});
   verb.add_flag("--bright", options->bright, "the ball or disc is brighter than what surrounds it");
   verb.add_option("--min-diameter-px", options->min_diameter_px, "of the image of the ball or disc");
   verb.add_option("--max-diameter-px", options->max_diameter_px, "of the image of the ball or disc");
@@ -333,7 +346,7 @@ void add_calibrate_survey(cli::Verb calibrate, int& exit_status) {
   verb.add_option("--body", options->body, "CSV of a body: mark x_mm y_mm z_mm [radius_mm nx ny nz]");
   verb.add_option("--radius-mm", options->radius_mm, "of the body's marks where the table does not say");
   verb.add_option("--robot", options->robot, "the CSV of the hand's poses to write").required();
-  verb.add_option("--points", options->points, "the CSV of the pixels to write").required();
+  verb.add_option("--points", options->points, "the CSV of the pixels to write");
   verb.add_flag("--replace", options->replace, "overwrite these two");
   verb.add_option("--patience", options->patience_s, "seconds to wait for all positions").shows_default();
   verb.add_flag("--json", options->json,

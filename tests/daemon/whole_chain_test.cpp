@@ -35,6 +35,35 @@ TEST(WholeChain, ARobotCalibratesTheCamerasThatGuideItAfterwards) {
       << "a sheet was not corrected within 2 mm at its ends, or its verdict was wrong";
 }
 
+// No camera looks; the simulated pointer misses the tip by 0.1 mm on each axis.
+TEST(WholeChain, ARobotThatTouchesATipTellsWhereItsToolEnds) {
+  const Site site("press-shop");
+  const auto robot = site.simulated({"--survey", "pointer"});
+  const auto running = site.daemon();
+  site.ask({"status", "--wait", "30"});
+  site.ask(
+      {"calibrate", "survey", "--target", "touch", "--positions", "8", "--robot", site.file("touches.csv")});
+  EXPECT_EQ(robot->wait(20s), 0) << text_of_file(site.folder / "cell.log");
+  const Finished tool = site.zeropose({"calibrate", "tool", "--touches", site.file("touches.csv"), "--json"});
+  ASSERT_EQ(tool.status, 0) << tool.out << tool.err;
+  const Json answer = Json::parse(tool.out);
+  const std::array<double, 3> truth{12.5, -8, 215};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_LT(answer["sigma"][axis].get<double>(), 0.2);
+    EXPECT_NEAR(answer["p_HT"][axis].get<double>(), truth[axis], 4.5 * answer["sigma"][axis].get<double>());
+  }
+  for (const std::vector<std::string>& more :
+       {std::vector<std::string>{"--target", "touch", "--camera", "left"},
+        {"--target", "ball", "--camera", "left"}}) {
+    std::vector<std::string> wrong{"calibrate",   "survey",
+                                   "--positions", "8",
+                                   "--robot",     site.file("new.csv"),
+                                   "--socket",    site.file("zeropose.sock")};
+    wrong.insert(wrong.end(), more.begin(), more.end());
+    EXPECT_EQ(site.zeropose(wrong).status, 2);
+  }
+}
+
 TEST(WholeChain, UndoBringsTheCalibrationBack) {
   const Site site("press-shop");
   std::ofstream(site.folder / "new.json") << camera_text(site.truth_of("left"), true);
