@@ -130,7 +130,7 @@ std::size_t removed_in(std::span<const Car> cars) {
   return count;
 }
 
-TEST(Accuracy, OfRelativePosesWithTheTrueCalibration) {
+TEST(AccuracyLong, OfRelativePosesWithTheTrueCalibration) {
   const RenderedCell& cell = rendered_cell();
   std::uint64_t noise_state = 1;
   const ZeroResult zero = measured_zero(cell.clean_zero(), cell.truth(), noise_state);
@@ -217,7 +217,7 @@ TEST(Accuracy, OfRelativePosesWithACalibrationAsWrongAsInPractice) {
   EXPECT_LE(rms.tail<3>().maxCoeff(), 0.004);
 }
 
-TEST(Accuracy, StaysWithOneMarkCovered) {
+TEST(AccuracyLong, StaysWithOneMarkCovered) {
   const int count = quick() ? 1 : 12;
   const std::string covered = rendered_cell().job().marks[3].name;
   const auto cars = Series(3, count, {{covered}, {}}).measured(1);
@@ -230,7 +230,7 @@ TEST(Accuracy, StaysWithOneMarkCovered) {
   }
 }
 
-TEST(Accuracy, StaysWithOneMarkTwentyPixelsOff) {
+TEST(AccuracyLong, StaysWithOneMarkTwentyPixelsOff) {
   const int count = quick() ? 1 : 6;
   for (const std::size_t wrong : {0u, 7u}) {
     const Mark& mark = rendered_cell().job().marks[wrong];
