@@ -12,12 +12,13 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr int crossing_halvings = 30;
+constexpr double end_sigmas = 4;   // of a line: so near to its end another one does not cross it
 constexpr double most_turn = 0.5;  // sine of 30 degrees
 
 // Pixel by pixel along the upright line until it has passed the level one, then between by halves: where they
 // meet their centres pull each other, so that steps from one line to the other need not settle. Nothing where
-// they do not meet between their ends.
-std::optional<Vector2d> crossing_of(const LightLine& upright, const LightLine& level) {
+// they do not meet clear of their ends: the round end of a line may look like a short piece of another one.
+std::optional<Vector2d> crossing_of(const LightLine& upright, const LightLine& level, double end_px) {
   const auto above = [&](double v) {  // px; below 0: past the level line
     const auto u = upright.place_at(v);
     const auto there = u ? level.place_at(*u) : std::nullopt;
@@ -35,12 +36,16 @@ std::optional<Vector2d> crossing_of(const LightLine& upright, const LightLine& l
       if (!there) return std::nullopt;
       (*there >= 0 ? from : to) = middle;
     }
-    return Vector2d(*upright.place_at(from), from);
+    const double u = *upright.place_at(from);
+    const bool clear =
+        std::min({from - upright.from(), upright.to() - from, u - level.from(), level.to() - u}) > end_px;
+    return clear ? std::optional<Vector2d>({u, from}) : std::nullopt;
   }
   return std::nullopt;
 }
 
 struct Found {
+  double end_px = 0;                      // crossings count so far from the ends of both lines
   std::vector<LightLine> radial, across;  // left to right, outside to inside
   // [across][radial]
   std::vector<std::vector<std::optional<Vector2d>>> crossings;
@@ -57,7 +62,7 @@ struct Found {
     crossings.clear();
     for (const LightLine& level : across) {
       auto& row = crossings.emplace_back();
-      for (const LightLine& upright : radial) row.push_back(crossing_of(upright, level));
+      for (const LightLine& upright : radial) row.push_back(crossing_of(upright, level, end_px));
     }
   }
 };
@@ -83,11 +88,11 @@ std::vector<std::size_t> crossings_of_groups(const Found& found) {
 // The group with the most crossings stays, of equals all; what crosses nothing goes. The lines stand in the
 // order in which they cross the image's middle of the other kind.
 Found sorted(std::vector<LightLine> radial, std::vector<LightLine> across, const LineArrayProblem& problem) {
-  Found found{std::move(radial), std::move(across), {}};
+  Found found{end_sigmas * problem.search.sigma_px, std::move(radial), std::move(across), {}};
   found.cross();
   const std::vector<std::size_t> crossings = crossings_of_groups(found);
   const std::size_t most = crossings.empty() ? 0 : std::max(std::size_t{1}, std::ranges::max(crossings));
-  Found kept;
+  Found kept{found.end_px, {}, {}, {}};
   for (std::size_t i = 0; i < found.radial.size(); ++i)
     if (crossings[i] == most) kept.radial.push_back(found.radial[i]);
   for (std::size_t i = 0; i < found.across.size(); ++i)
