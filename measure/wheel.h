@@ -30,7 +30,9 @@ struct WheelProblem {
   LineLayout layout;
   LightLineSearch search;
   ExpectedTyre tyre;
-  Pose X_WN = Pose::Identity();                   // the nominal wheel: z its axis, x forward, y up
+  // The nominal wheel: z its axis. Camber and toe are about axes with rz = 0 in W, so x of W must point
+  // forward and y up as well: look_at_wheel() gives all cameras in the nominal wheel's frame.
+  Pose X_WN = Pose::Identity();
   double max_tilt_rad = 0.09, max_shift_mm = 25;  // of the wheel from there
   std::optional<Pose> X_WO0;                      // the zero wheel, as measured; none: X_WN
 };

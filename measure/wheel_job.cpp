@@ -64,8 +64,9 @@ Code code_of(WheelStatus status) {
 }
 
 Verdict check_wheel_sigma(const WheelTask& task, const WheelResult& wheel) {
+  if (wheel.sigma_camber_rad <= task.max_sigma_rad && wheel.sigma_toe_rad <= task.max_sigma_rad)
+    return {Code::ok, {}};
   const double sigma_rad = std::max(wheel.sigma_camber_rad, wheel.sigma_toe_rad);
-  if (sigma_rad <= task.max_sigma_rad) return {Code::ok, {}};
   return {Code::sigma_too_large, "the sigma of camber or toe is " +
                                      number(sigma_rad * degrees_per_radian, 4) + " deg, allowed are " +
                                      number(task.max_sigma_rad * degrees_per_radian, 4) + " deg"};

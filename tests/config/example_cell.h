@@ -41,4 +41,18 @@ inline std::vector<std::string> mistakes_in(const std::string& cell,
 
 inline std::vector<std::string> mistakes_in(const Json& cell) { return mistakes_in(cell.dump()); }
 
+// Another example cell and its calibration, to be changed.
+struct ExampleFiles {
+  explicit ExampleFiles(const std::string& name)
+      : json(parsed(text_of(name + ".json"))), calibration(parsed(text_of(name + ".calibration.json"))) {}
+
+  Json& job() { return json["jobs"][0]; }
+  std::vector<std::string> mistakes() const { return mistakes_in(json.dump(), calibration.dump()); }
+  static std::string text_of(const std::string& file) {
+    return read_file(std::string(ZEROPOSE_SOURCE_DIR) + "/config/cells/" + file);
+  }
+
+  Json json, calibration;
+};
+
 }  // namespace zeropose

@@ -12,18 +12,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class Gaps : public testing::Test {
+class Gaps : public testing::Test, protected ExampleFiles {
  protected:
-  Json& job() { return json["jobs"][0]; }
+  Gaps() : ExampleFiles("pane-gaps") {}
   Json& gaps() { return job()["gaps"]; }
   Json& place(std::size_t i) { return gaps()["places"][i]; }
-  std::vector<std::string> mistakes() const { return mistakes_in(json.dump(), calibration.dump()); }
-  static std::string text_of(const char* ending) {
-    return read_file(std::string(ZEROPOSE_SOURCE_DIR) + "/config/cells/pane-gaps" + ending);
-  }
-
-  Json json = parsed(text_of(".json"));
-  Json calibration = parsed(text_of(".calibration.json"));
 };
 
 TEST_F(Gaps, AreReadWithTheirUnits) {

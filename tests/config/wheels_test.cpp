@@ -12,18 +12,11 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class Wheels : public testing::Test {
+class Wheels : public testing::Test, protected ExampleFiles {
  protected:
-  Json& job() { return json["jobs"][0]; }
+  Wheels() : ExampleFiles("wheel-alignment") {}
   Json& wheel() { return job()["wheel"]; }
   Json& sensor(std::size_t i) { return wheel()["sensors"][i]; }
-  std::vector<std::string> mistakes() const { return mistakes_in(json.dump(), calibration.dump()); }
-  static std::string text_of(const char* ending) {
-    return read_file(std::string(ZEROPOSE_SOURCE_DIR) + "/config/cells/wheel-alignment" + ending);
-  }
-
-  Json json = parsed(text_of(".json"));
-  Json calibration = parsed(text_of(".calibration.json"));
 };
 
 TEST_F(Wheels, AreReadWithTheirUnits) {
