@@ -377,7 +377,9 @@ def main():
     print("session as it should be")
     server.stop()
     os.sched_setaffinity(0, processors)
+    robot.drain()
     server = Server(options.server, interface)
+    server.wait_for("opened", 1)
     for check in (lambda: check_heartbeat(robot), lambda: check_refusals(robot, server), lambda: check_nmt(robot),
                   lambda: check_fault(robot, "185#0100000000000000", 0x8150, 1),
                   lambda: check_fault(robot, "20000040#0000000000000000", 0x8140, 2),
