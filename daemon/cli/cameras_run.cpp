@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <stdexcept>
 
 #include "config/cell.h"
 #include "config/text.h"
@@ -77,9 +78,18 @@ std::filesystem::path numbered(const std::string& folder, int frame) {
   return std::filesystem::path(folder) / name.str();
 }
 
+// One of its own: what lies in a folder is replayed as one stream.
+void make_folder_for_frames(const std::string& folder) {
+  std::filesystem::create_directories(folder);
+  if (!std::filesystem::is_empty(folder))
+    throw std::invalid_argument(folder +
+                                ": there are files in it, and the frames would be replayed among them: "
+                                "name a new folder");
+}
+
 Answer stream(const StreamOptions& options) {
   const CameraOptions camera = chosen_camera(options);
-  if (!options.save.empty()) std::filesystem::create_directories(options.save);
+  if (!options.save.empty()) make_folder_for_frames(options.save);
   CameraTrialOptions trial_options;
   trial_options.duration = seconds_of(options.seconds);
   trial_options.rate_hz = options.rate_hz;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <sstream>
@@ -141,6 +142,9 @@ Answer verify_cell(const Options& options) {
                            ": it has no points of an object to verify"}));
   std::optional<ZeroRecord> zero;
   if (!options.state.empty()) {
+    if (!std::filesystem::is_directory(options.state))
+      throw std::invalid_argument(options.state +
+                                  ": no such folder; --state is the daemon's state directory");
     StoredZero stored = load_zero_for(options.state, cell, job);
     if (stored.code != Code::ok) {
       Answer answer = failure(stored.reason);

@@ -52,6 +52,8 @@ class Verify(Case):
 
     def test_wrong_usage(self):
         self.expect_refused(run("verify", "--cell", CELL, "--points", self.points()), "--state or --pose")
+        self.expect_refused(run("verify", "--cell", CELL, "--points", self.points(), "--state", self.path("none")),
+                            "none: no such folder")
         pose = "--pose", "0,0,0,0,0,0"
         table = self.write("w.csv", HEAD + "door,,1,2,3\n,roof,1,2,3\ncamera1/1,front left,1,2,3\n,,1,2,3\n")
         self.expect_refused(run("verify", "--cell", CELL, "--points", table, *pose), '"door"', "a mark of job",
