@@ -6,12 +6,13 @@ find_package(nlohmann_json 3.11 REQUIRED)
 set(standard_headers <algorithm> <array> <atomic> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory>
     <mutex> <numbers> <optional> <random> <set> <span> <sstream> <string> <thread> <variant> <vector>)
 
-# zeropose_precompiled(GROUP LINK ... HEADERS ...): what zeropose_precompile(TARGET GROUP) then uses. The compiler takes
+# zeropose_precompiled(GROUP LINK ... HEADERS ... OPTIONS ...): what zeropose_precompile(TARGET GROUP) then uses. The compiler takes
 # it only for files of the same flags.
 function(zeropose_precompiled group)
-  cmake_parse_arguments(GROUP "" "" "LINK;HEADERS" ${ARGN})
+  cmake_parse_arguments(GROUP "" "" "LINK;HEADERS;OPTIONS" ${ARGN})
   add_library(zeropose_precompiled_${group} OBJECT ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)
   target_link_libraries(zeropose_precompiled_${group} PRIVATE zeropose_flags ${GROUP_LINK})
+  target_compile_options(zeropose_precompiled_${group} PRIVATE ${GROUP_OPTIONS})
   target_precompile_headers(zeropose_precompiled_${group} PRIVATE ${standard_headers} ${GROUP_HEADERS})
 endfunction()
 

@@ -17,6 +17,10 @@ if(ZEROPOSE_SANITIZE)
     target_compile_options(zeropose_flags INTERFACE --param=ggc-min-heapsize=400000)  # kB before it collects garbage
   endif()
   target_link_options(zeropose_flags INTERFACE -fsanitize=${ZEROPOSE_SANITIZE})
+  if(ZEROPOSE_SANITIZE MATCHES address AND NOT ZEROPOSE_FUZZ)
+    # Or Eigen would lay out its memory otherwise than in the release build's test objects.
+    target_compile_definitions(zeropose_flags INTERFACE EIGEN_MALLOC_ALREADY_ALIGNED=1)
+  endif()
   if(ZEROPOSE_SANITIZE MATCHES undefined)
     # These make files that use Eigen or JSON four times slower to compile; AddressSanitizer finds what they would.
     target_compile_options(zeropose_flags INTERFACE -fno-sanitize=null,alignment,object-size,vptr)
@@ -26,14 +30,21 @@ endif()
 # Rooms without threads have nothing for ThreadSanitizer, and with it they would miss every deadline: there they come
 # from another build.
 set(ZEROPOSE_ROOMS_WITHOUT_THREADS_OF "" CACHE PATH "The finished build of another preset that they come from")
+# So does what only tests and demos use, with AddressSanitizer too.
+set(ZEROPOSE_TEST_OBJECTS_OF "" CACHE PATH "The finished release build that the tests' code comes from")
 
 # zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME. PRECOMPILED: the group of headers it begins with.
 function(zeropose_room name)
-  cmake_parse_arguments(ROOM "WITHOUT_THREADS" "PRECOMPILED" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
-  if(ROOM_WITHOUT_THREADS AND ZEROPOSE_ROOMS_WITHOUT_THREADS_OF)
+  cmake_parse_arguments(ROOM "WITHOUT_THREADS;OF_TESTS" "PRECOMPILED" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
+  set(build "")
+  if(ROOM_WITHOUT_THREADS)
+    set(build ${ZEROPOSE_ROOMS_WITHOUT_THREADS_OF})
+  elseif(ROOM_OF_TESTS)
+    set(build ${ZEROPOSE_TEST_OBJECTS_OF})
+  endif()
+  if(build)
     add_library(zeropose_${name} STATIC IMPORTED GLOBAL)
-    set_target_properties(zeropose_${name} PROPERTIES
-      IMPORTED_LOCATION ${ZEROPOSE_ROOMS_WITHOUT_THREADS_OF}/${name}/libzeropose_${name}.a)
+    set_target_properties(zeropose_${name} PROPERTIES IMPORTED_LOCATION ${build}/${name}/libzeropose_${name}.a)
     target_link_libraries(zeropose_${name} INTERFACE zeropose_flags ${ROOM_LINK} ${ROOM_PRIVATE_LINK})
     return()
   endif()

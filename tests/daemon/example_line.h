@@ -14,7 +14,7 @@
 
 namespace zeropose {
 
-inline std::string bin(const char* name) { return std::string(ZEROPOSE_BIN_DIR) + "/" + name; }
+inline std::string bin(const char* name) { return program_folder() / name; }
 
 class ExampleLine : public testing::Test {
  protected:

@@ -20,7 +20,7 @@
 namespace zeropose {
 namespace {
 
-bool quick() { return test::sanitized || std::getenv("ZEROPOSE_QUICK") != nullptr; }
+bool quick() { return test::sanitized() || std::getenv("ZEROPOSE_QUICK") != nullptr; }
 
 using CleanPictures = std::vector<std::vector<float>>;  // one per camera
 

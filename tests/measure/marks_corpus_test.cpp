@@ -71,7 +71,7 @@ TEST(MarksHard, FindsWhatItDidAndNothingWrong) {
     const Tally tally = tally_of(row);
     print(row, tally);
     const int right = static_cast<int>(tally.errors_px.size() - tally.wrong.size());
-    if (!test::sanitized) {
+    if (!test::sanitized()) {
       EXPECT_GE(right, row.least_found) << name_of(row.given.fault) << ' ' << row.given.strength;
     }
     EXPECT_EQ(tally.wrong, std::vector<unsigned>{}) << name_of(row.given.fault) << ' ' << row.given.strength;

@@ -142,7 +142,7 @@ Matrix2d bound_of(const PatternScene& scene) {
 // hold to 1.1 %. Below 0.9 the bound itself would be wrong.
 TEST(PatternAccuracy, NearTheBoundWithHonestCovariance) {
   std::mt19937_64 random(6);
-  constexpr int draws = test::trials(50);
+  const int draws = test::trials(50);
   double squares = 0, bound = 0, held = 0, count = 0;
   for (std::uint64_t seed = 100; seed < 108; ++seed) {
     const PatternScene scene = random_scene(seed);
@@ -158,7 +158,7 @@ TEST(PatternAccuracy, NearTheBoundWithHonestCovariance) {
       ++count;
     }
   }
-  if (test::sanitized) return;
+  if (test::sanitized()) return;
   EXPECT_LE(std::sqrt(squares / bound), 1.25);
   EXPECT_GE(std::sqrt(squares / bound), 0.9);
   EXPECT_NEAR(held / count, 0.95, 4 * std::sqrt(0.95 * 0.05 / count));

@@ -17,7 +17,7 @@ using test::KnockedCamera;
 using test::Random;
 using Method = RecalibrationMethod;
 
-constexpr int trials = test::sanitized ? 30 : 200;
+const int trials = test::sanitized() ? 30 : 200;
 
 KnockedCamera knocked(const Pose& X_CoCn, std::vector<test::FixedPoint> layout) {
   KnockedCamera camera;

@@ -21,7 +21,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Method = RecalibrationMethod;
 
-constexpr int trials = test::sanitized ? 200 : 1000;
+const int trials = test::sanitized() ? 200 : 1000;
 
 std::vector<Distortion> both_lenses() {
   return {Division{-0.29}, BrownConrady{-0.25, 0.3, 0.001, -0.0007, 0.1}};

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/measure/wheel_scene.h"
+#include "tests/support/sanitized.h"
 
 namespace zeropose::test {
 namespace {
@@ -52,7 +53,12 @@ class WheelJob : public testing::Test {
     const WheelPictures pictures = exposed(clean(tilted), noise);
     return look_at_wheel(images_of(pictures), job, cameras, zero);
   }
+  // Where the wheel stands at the world's origin: taken once for all tests, it is the same.
   Zero zero() {
+    static const Zero once = fresh_zero();
+    return once;
+  }
+  Zero fresh_zero() {
     const std::vector<WheelResult> exposures{seen(false), seen(false)};
     const ZeroResult result = make_wheel_zero(job, exposures);
     EXPECT_EQ(result.code, Code::ok) << result.reason;
@@ -80,11 +86,13 @@ class WheelJob : public testing::Test {
 
 // Also where the wheel's axis lies along x of the world, and its forward direction is none of the world's.
 TEST_F(WheelJob, AnswersShiftCamberAndToeInAnyWorld) {
-  for (const Pose& X_WN :
-       {Pose::Identity(), from_six_numbers({1320, -775, 318, 90, 0, 0}),
-        from_six_numbers({10, 20, 30, 90, 0, 90}), from_six_numbers({-500, 900, 1200, 30, -40, 110})}) {
+  std::vector<Pose> worlds{from_six_numbers({-500, 900, 1200, 30, -40, 110}), Pose::Identity(),
+                           from_six_numbers({1320, -775, 318, 90, 0, 0}),
+                           from_six_numbers({10, 20, 30, 90, 0, 90})};
+  if (sanitized()) worlds.resize(1);
+  for (const Pose& X_WN : worlds) {
     into_world(X_WN);
-    const Zero at_zero = zero();
+    const Zero at_zero = fresh_zero();
     EXPECT_GT(at_zero.profile_radius_mm, 200);
     EXPECT_LT((X_WN.inverse() * at_zero.X_WO0).translation().norm(), 6);
     const Measurement m = measured(exposed(clean(true), noise), at_zero);

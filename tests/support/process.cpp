@@ -87,6 +87,10 @@ std::optional<int> Process::wait(std::chrono::milliseconds patience) {
   return status_;
 }
 
+std::filesystem::path program_folder() {
+  return std::filesystem::read_symlink("/proc/self/exe").parent_path();
+}
+
 Finished run_program(const std::vector<std::string>& command, std::chrono::seconds patience) {
   std::string folder = (std::filesystem::temp_directory_path() / "zeropose-run-XXXXXX").string();
   if (!::mkdtemp(folder.data())) throw std::runtime_error("cannot make " + folder);

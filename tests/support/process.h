@@ -35,6 +35,9 @@ class Process {
   std::optional<int> status_;
 };
 
+// Where this test's program is, and the programs it was built with.
+std::filesystem::path program_folder();
+
 struct Finished {
   int status = -1;
   std::string out, err;

@@ -36,7 +36,7 @@ RecorderOptions recorder_options(const LineRobot& robot) {
 
 std::string program_path(const std::string& name) {
   const char* tools = name == "zeroposed" ? nullptr : std::getenv("ZEROPOSE_TOOLS");
-  return (tools != nullptr ? tools : std::string(ZEROPOSE_BIN_DIR)) + "/" + name;
+  return (tools != nullptr ? std::filesystem::path(tools) : program_folder()) / name;
 }
 
 WalkingLine::WalkingLine(std::filesystem::path cell, const LineRobot& robot)
