@@ -6,8 +6,8 @@ find_package(nlohmann_json 3.11 REQUIRED)
 set(standard_headers <algorithm> <array> <atomic> <chrono> <cmath> <filesystem> <fstream> <functional> <map> <memory>
     <mutex> <numbers> <optional> <random> <set> <span> <sstream> <string> <thread> <variant> <vector>)
 
-# zeropose_precompiled(GROUP LINK ... HEADERS ... OPTIONS ...): what zeropose_precompile(TARGET GROUP) then uses. The compiler takes
-# it only for files of the same flags.
+# zeropose_precompiled(GROUP LINK ... HEADERS ... OPTIONS ...): what zeropose_precompile(TARGET GROUP) then uses. The
+# compiler takes it only for files of the same flags, and its optimisation is theirs.
 function(zeropose_precompiled group)
   cmake_parse_arguments(GROUP "" "" "LINK;HEADERS;OPTIONS" ${ARGN})
   add_library(zeropose_precompiled_${group} OBJECT ${PROJECT_SOURCE_DIR}/cmake/empty.cpp)

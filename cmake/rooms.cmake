@@ -34,6 +34,7 @@ set(ZEROPOSE_ROOMS_WITHOUT_THREADS_OF "" CACHE PATH "The finished build of anoth
 set(ZEROPOSE_TEST_OBJECTS_OF "" CACHE PATH "The finished release build that the tests' code comes from")
 
 # zeropose_room(NAME SOURCES ... LINK ...): the library zeropose_NAME. PRECOMPILED: the group of headers it begins with.
+# OF_TESTS: what tests look at and measure with.
 function(zeropose_room name)
   cmake_parse_arguments(ROOM "WITHOUT_THREADS;OF_TESTS" "PRECOMPILED" "SOURCES;LINK;PRIVATE_LINK" ${ARGN})
   set(build "")
@@ -43,8 +44,9 @@ function(zeropose_room name)
     set(build ${ZEROPOSE_TEST_OBJECTS_OF})
   endif()
   if(build)
+    file(RELATIVE_PATH folder ${CMAKE_BINARY_DIR} ${CMAKE_CURRENT_BINARY_DIR})
     add_library(zeropose_${name} STATIC IMPORTED GLOBAL)
-    set_target_properties(zeropose_${name} PROPERTIES IMPORTED_LOCATION ${build}/${name}/libzeropose_${name}.a)
+    set_target_properties(zeropose_${name} PROPERTIES IMPORTED_LOCATION ${build}/${folder}/libzeropose_${name}.a)
     target_link_libraries(zeropose_${name} INTERFACE zeropose_flags ${ROOM_LINK} ${ROOM_PRIVATE_LINK})
     return()
   endif()

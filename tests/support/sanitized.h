@@ -4,8 +4,8 @@
 
 // Of the sanitizers' libraries, where one is linked. Asked at run time: a test program's objects are those of
 // the release build.
-extern "C" [[gnu::weak]] void __asan_init();  // NOLINT(bugprone-reserved-identifier)
-extern "C" [[gnu::weak]] void __tsan_init();  // NOLINT(bugprone-reserved-identifier)
+extern "C" [[gnu::weak]] void __asan_init();
+extern "C" [[gnu::weak]] void __tsan_init();
 
 namespace zeropose::test {
 
